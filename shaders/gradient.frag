@@ -6,7 +6,6 @@
 
 uniform sampler3D u_density;   // 0..1, inside a border of air one voxel thick
 uniform vec3 u_texels;         // its extent
-uniform bool u_has_cells;      // unequal edges; then:
 uniform sampler3D u_cell_gradient;  // of each cell (bridge/page/web/cell_gradients.js)
 uniform vec3 u_cell_scale;     // from texture coordinates of u_density to those of u_cell_gradient
 uniform vec3 u_cell_shift;
@@ -16,20 +15,20 @@ uniform vec3 u_fine;           // 1 along axes where cells have several voxels
 float density_of(vec4 texel);
 vec3 followed(vec3 voxel, vec3 cell, vec3 fine, vec3 per_edge);
 
-// For cubes a browser stores no gradient: from the eight corners of a cube, differences along one
-// axis, means along the others. Farther corners leave the two voxels over which a border is
-// antialiased, and draw terraces.
+// Where a cell is one voxel, its gradient; else also that of the voxels, from the eight corners of a
+// cube: differences along one axis, means along the others. Farther corners leave the two voxels over
+// which a border is antialiased, and draw terraces.
 vec3 gradient_at(vec3 p) {
   const float kReachVox = 1.0;
+  vec3 cell = textureLod(u_cell_gradient, p * u_cell_scale + u_cell_shift, 0.0).xyz;
+  if (u_fine == vec3(0.0)) return cell * u_per_edge * u_texels;
   vec3 d = kReachVox / u_texels;
   vec3 sum = vec3(0.0);
   for (int corner = 0; corner < 8; ++corner) {
     vec3 side = vec3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1);
     sum += side * density_of(texture(u_density, p + side * d));
   }
-  if (!u_has_cells) return sum * u_texels;
   // A step from air to full density over two edges is 1 in each of four pairs of corners.
-  vec3 cell = textureLod(u_cell_gradient, p * u_cell_scale + u_cell_shift, 0.0).xyz;
   return followed(0.25 * sum, cell, u_fine, u_per_edge) * u_per_edge * u_texels;
 }
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Normals that the page draws of voxels with unequal edges, in headless Chromium with the page's own modules.
+"""Normals that the page draws of cubes and of voxels with unequal edges, in headless Chromium with the page's own modules.
 
-    normals_test.py [CASE...]      print_all: the angles, those of cubes too
+    normals_test.py [CASE...]      print_all: the angles alone
 Exit code 77: skipped, for want of a browser."""
 import pathlib
 import shutil
@@ -15,8 +15,8 @@ from tab import ROOT, check, exit_code  # noqa: E402
 
 # Those of the visualizer's own test, at 99 of 100 points.
 MOST_DEGREES, MOST_OF_BINARY = 3.0, 3.75
-RATIOS = [(1, 1, 2), (2, 1, 1), (1, 2, 1), (1, 1, 5), (1, 5, 1), (5, 1, 1), (1, 1, 10), (1, 10, 1), (10, 1, 1), (1, 10, 10)]
-FEW = [(1, 1, 1.5), (1, 3.7, 1), (1, 2, 8), (10, 1, 1), (1, 10, 10)]
+RATIOS = [(1, 1, 1), (1, 1, 2), (2, 1, 1), (1, 2, 1), (1, 1, 5), (1, 5, 1), (5, 1, 1), (1, 1, 10), (1, 10, 1), (10, 1, 1), (1, 10, 10)]
+FEW = [(1, 1, 1), (1, 1, 1.5), (1, 3.7, 1), (1, 2, 8), (10, 1, 1), (1, 10, 10)]
 
 
 def make_folder(folder):
@@ -78,7 +78,7 @@ def the_longest_voxels_are_drawn(bodies):
 
 
 def print_all(bodies):
-    for ratio in ((1, 1, 1), *FEW, *RATIOS):
+    for ratio in sorted({*FEW, *RATIOS}):
         print(ratio, *(f"{kind} {border} {bodies.angles(ratio, kind, border)['p99']:.2f}" for kind in ('iso', 'blend')
                        for border in ('partial', 'binary')), flush=True)
 

@@ -122,11 +122,10 @@ class Rig:
         raise RuntimeError('kerf-bridge: ' + self.log('bridge'))
 
     def native_picture(self, width, height, *look):
-        """What kerf-visualizer shows, as PNG, with the gradient that the page has."""
+        """What kerf-visualizer shows, as PNG."""
         out = self.path('native')
         subprocess.run([os.path.join(self.bin, 'kerf-visualizer'), '--headless', '--name', self.name, '--frames', '1',
-                        '--every-ticks', '1', '--size', f'{width}x{height}', '--gradient', 'corners',
-                        '--out', out, *look],
+                        '--every-ticks', '1', '--size', f'{width}x{height}', '--out', out, *look],
                        check=True, stdout=subprocess.DEVNULL, timeout=60)
         with open(os.path.join(out, 'frame-0001.png'), 'rb') as picture:
             return picture.read()

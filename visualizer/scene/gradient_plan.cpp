@@ -51,15 +51,17 @@ AxisTaps corners() {
 }
 /// Farid and Simoncelli, "Differentiation of discrete multidimensional signals", IEEE Trans. Image
 /// Processing 13(4), 2004; in the integers of the servo.
+constexpr float kFaridSmooth[]{5, 32, 55, 32, 5}, kFaridSlope[]{-14, -35, 0, 35, 14};
 AxisTaps farid5() {
-  return axis_taps({{5, 32, 55, 32, 5}}, {{-14, -35, 0, 35, 14}});
+  return axis_taps(kFaridSmooth, kFaridSlope);
 }
 /// Means over 5, 5 and 7 voxels, a quadratic spline whose spread is that of a Gaussian of 2.8.
 /// Where a cut sphere is parallel to the voxels its steps are terraces sqrt(2 R) voxels long: 3, 5
 /// and 5 leave 3.9 degrees of those of R = 28 at 99 of 100 points, this leaves 2.
+constexpr float kWideSmooth[]{1, 3, 6, 10, 15, 19, 22, 23, 22, 19, 15, 10, 6, 3, 1};
+constexpr float kWideSlope[]{-1, -2, -2, -2, -2, -2, -2, 0, 2, 2, 2, 2, 2, 2, 1};
 AxisTaps wide15() {
-  return axis_taps({{1, 3, 6, 10, 15, 19, 22, 23, 22, 19, 15, 10, 6, 3, 1}},
-                   {{-1, -2, -2, -2, -2, -2, -2, 0, 2, 2, 2, 2, 2, 2, 1}});
+  return axis_taps(kWideSmooth, kWideSlope);
 }
 
 /// The quadratic spline of a spread in cells, and its derivative: a spline whose knots are w apart

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of voxels with unequal edges, as `adaptive` of visualizer/scene/gradient: the voxels are
-// gathered into cells that are nearly cubes, and these filtered by mm. The shader takes for a point
-// what lies between the centres of cells (followed.frag).
-import {kAdaptedAgree, kAdaptedDiffer, kCubic, kMiddle, kMostInCell, kNarrowPerLongest, kSurfaceSlope,
-  kWidePerLongest, kWidePerShortest} from './constants.js';
+// Gradients of voxels, as `adaptive` of visualizer/scene/gradient: a narrow filter, and the direction of a wide one
+// where this hardly differs. Voxels with unequal edges are gathered into cells that are nearly cubes, and these filtered
+// by mm. The shader takes for a point what lies between the centres of cells (followed.frag).
+import {kAdaptedAgree, kAdaptedDiffer, kCubic, kFaridSlope, kFaridSmooth, kMiddle, kMostInCell, kNarrowPerLongest,
+  kSurfaceSlope, kWidePerLongest, kWidePerShortest, kWideSlope, kWideSmooth} from './constants.js';
 import {clamp} from './math.js';
 
 const kFull = 65535;
@@ -13,44 +13,50 @@ const extentOf = (low, high) => high.map((n, axis) => n - low[axis]);
 const cellsIn = ({low, high}) => countOf(extentOf(low, high));
 const largest = values => values.reduce((a, b) => Math.max(a, b));
 
-/** The quadratic spline of a spread in cells, and its derivative: {reach, smooth, slope, smoothSum, slopeSum}. */
+/** Taps along one axis, from `reach` cells before the middle to `reach` after it, and their sums: a slope's is that of a
+ * ramp of one step per cell. A smoothing is even, a slope odd. */
+function tapsOf(smooth, slope) {
+  const reach = smooth.length >> 1, sum = (all, value) => all.reduce((total, one, i) => total + value(one, i - reach), 0);
+  return {reach, smooth: Float32Array.from(smooth), slope: Float32Array.from(slope),
+    smoothSum: sum(smooth, one => one), slopeSum: sum(slope, (one, i) => i * one)};
+}
+
+/** The quadratic spline of a spread in cells, and its derivative. */
 function spline(spread) {
   const apart = 2 * spread;
   const reach = clamp(Math.ceil(1.5 * apart) - 1, 1, kMiddle);
-  const taps = {reach, smooth: new Float32Array(2 * reach + 1), slope: new Float32Array(2 * reach + 1),
-    smoothSum: 0, slopeSum: 0};
+  const smooth = [], slope = [];
   for (let i = -reach; i <= reach; ++i) {
     const at = Math.abs(i / apart), rest = Math.max(1.5 - at, 0);
     const down = at < 0.5 ? 2 * at : rest;
-    taps.smooth[reach + i] = at < 0.5 ? 0.75 - at * at : 0.5 * rest * rest;
-    taps.slope[reach + i] = i < 0 ? -down : down;
-    taps.smoothSum += taps.smooth[reach + i];
-    taps.slopeSum += i * taps.slope[reach + i];
+    smooth.push(Math.fround(at < 0.5 ? 0.75 - at * at : 0.5 * rest * rest));
+    slope.push(Math.fround(i < 0 ? -down : down));
   }
-  return taps;
+  return tapsOf(smooth, slope);
 }
+
+/** Standard deviation of the smoothing whose derivative the slope is. */
+const spreadOf = ({reach, slope, slopeSum}) =>
+  Math.sqrt(slope.reduce((third, one, i) => third + (i - reach) ** 3 * one, 0) / (3 * slopeSum));
 
 /** As `GradientPlan::surface_mm`, of voxels with these edges. */
 export function surfaceMm(edges) {
-  const longest = largest(edges), shortest = Math.min(...edges);
-  // The difference over two edges, by which cubes are shaded, is a mean of slopes that spread by the root of 1/3.
-  const spread = longest < kCubic * shortest ? Math.sqrt(1 / 3) : kNarrowPerLongest;
-  const s = Math.hypot(spread, 0.5), steepest = 2 / (Math.sqrt(2 * Math.PI) * s);
+  const {cubes, narrow} = cellPlan(edges), longest = largest(edges);
+  const s = Math.hypot(cubes ? spreadOf(narrow[0]) : kNarrowPerLongest, 0.5), steepest = 2 / (Math.sqrt(2 * Math.PI) * s);
   return s * Math.sqrt(2 * Math.log(Math.max(steepest / kSurfaceSlope, 1))) * longest;
 }
 
-/** As `GradientPlan` of C++, of the edges of a voxel: {cell, perEdge, narrow, wide, reachCells, reach}. Null for cubes:
- * their gradient is that of the shader alone. */
+/** As `GradientPlan` of C++, of the edges of a voxel: {cubes, cell, perEdge, narrow, wide, reachCells, reach}. */
 export function cellPlan(edges) {
   const longest = largest(edges), shortest = Math.min(...edges);
-  if (longest < kCubic * shortest) return null;
-  const cell = edges.map(edge => Math.trunc(Math.min(longest / edge + 0.01, kMostInCell)));
+  const cubes = longest < kCubic * shortest;
+  const cell = edges.map(edge => cubes ? 1 : Math.trunc(Math.min(longest / edge + 0.01, kMostInCell)));
   const wideMm = Math.max(kWidePerShortest * shortest, kWidePerLongest * longest);
   const cellMm = edges.map((edge, axis) => cell[axis] * edge);
-  const narrow = cellMm.map(mm => spline(kNarrowPerLongest * longest / mm));
-  const wide = cellMm.map(mm => spline(wideMm / mm));
+  const narrow = cellMm.map(mm => cubes ? tapsOf(kFaridSmooth, kFaridSlope) : spline(kNarrowPerLongest * longest / mm));
+  const wide = cellMm.map(mm => cubes ? tapsOf(kWideSmooth, kWideSlope) : spline(wideMm / mm));
   const reachCells = axes.map(axis => Math.max(narrow[axis].reach, wide[axis].reach));
-  return {cell, perEdge: edges.map(edge => edge / longest), narrow, wide, reachCells,
+  return {cubes, cell, perEdge: edges.map(edge => cubes ? 1 : edge / longest), narrow, wide, reachCells,
     // Of voxels: one lies between the centres of two cells.
     reach: axes.map(axis => cell[axis] === 1 ? reachCells[axis] :
       cell[axis] * (reachCells[axis] + 1) + (cell[axis] >> 1))};
@@ -72,24 +78,47 @@ export function joined(boxes) {
 /** Numbers of a box, x fastest. */
 const fieldOf = size => ({size, values: new Float32Array(countOf(size))});
 
-/** Taps along one axis, which becomes shorter by their reach at both ends. */
-function filtered(from, axis, taps, reach) {
-  const size = from.size.slice();
-  size[axis] -= 2 * reach;
-  const to = fieldOf(size);
+/** Of each row along x of a box, the part that is wanted: from `first` to before `end`. */
+class Rows {
+  constructor(size, first = size[0], end = 0) {
+    const rows = size[1] * size[2];
+    Object.assign(this, {size, first: new Int16Array(rows).fill(first), end: new Int16Array(rows).fill(end)});
+  }
+  take(row, first, end) {
+    this.first[row] = Math.min(this.first[row], first);
+    this.end[row] = Math.max(this.end[row], end);
+  }
+  /** What taps along y (axis 1) or z read for them, of a box that is larger by their reach at both ends. */
+  readAlong(axis, reach) {
+    const size = this.size.slice();
+    size[axis] += 2 * reach;
+    const made = new Rows(size), step = axis === 1 ? 1 : size[1];
+    for (let z = 0, row = 0; z < this.size[2]; ++z) {
+      for (let y = 0; y < this.size[1]; ++y, ++row) {
+        const first = this.first[row], end = this.end[row];
+        for (let i = 0, to = z * size[1] + y; first < end && i <= 2 * reach; ++i, to += step) made.take(to, first, end);
+      }
+    }
+    return made;
+  }
+}
+
+/** Taps along one axis, which becomes shorter by their reach at both ends; zeros where nothing is wanted. `sign` is 1 if
+ * they are even and -1 if they are odd: a slope is 0 where all voxels are alike. */
+function filtered(from, axis, taps, reach, sign, rows) {
+  const to = fieldOf(rows.size), half = taps.slice(reach);
   const [nx, ny] = from.size, {values: input} = from, {values: output} = to;
   const stride = [1, nx, nx * ny][axis];
-  let out = 0;
-  for (let z = 0; z < size[2]; ++z) {
-    for (let y = 0; y < size[1]; ++y) {
-      const row = (z * ny + y) * nx + reach * stride;
-      for (let at = row, end = row + size[0]; at < end; ++at) {
-        let sum = taps[reach] * input[at];
-        // In pairs, so that a slope is 0 where all voxels are alike.
+  for (let z = 0, row = 0, out = 0; z < rows.size[2]; ++z) {
+    for (let y = 0; y < rows.size[1]; ++y, ++row, out += rows.size[0]) {
+      const begin = (z * ny + y) * nx + reach * stride, end = rows.end[row];
+      for (let x = rows.first[row]; x < end; ++x) {
+        const at = begin + x;
+        let sum = half[0] * input[at];
         for (let i = 1, far = stride; i <= reach; ++i, far += stride) {
-          sum += taps[reach + i] * input[at + far] + taps[reach - i] * input[at - far];
+          sum += half[i] * (input[at + far] + sign * input[at - far]);
         }
-        output[out++] = sum;
+        output[out + x] = sum;
       }
     }
   }
@@ -100,31 +129,80 @@ function filtered(from, axis, taps, reach) {
 const scaleOf = (slope, smooth, other, perCell) =>
   1 / (0.5 * slope.slopeSum * smooth.smoothSum * other.smoothSum * kFull * perCell);
 
-/** The gradient's parts of the cells within `field`, which reaches as far beyond them as the taps do. */
-function partsOf([x, y, z], field, perCell) {
-  const smoothX = filtered(field, 0, x.smooth, x.reach), slopeX = filtered(field, 0, x.slope, x.reach);
-  const along = (from, last, a, b, c, axis) => ({values: filtered(from, 2, last, z.reach).values,
-    scale: scaleOf(a, b, c, perCell[axis])});
-  return [along(filtered(slopeX, 1, y.smooth, y.reach), z.smooth, x, y, z, 0),
-    along(filtered(smoothX, 1, y.slope, y.reach), z.smooth, y, z, x, 1),
-    along(filtered(smoothX, 1, y.smooth, y.reach), z.slope, z, x, y, 2)];
+/** The gradient's parts of the wanted cells within `field`, which reaches as far beyond them as the taps do. */
+function partsOf([x, y, z], field, perCell, rows) {
+  const forZ = rows.readAlong(2, z.reach), forY = forZ.readAlong(1, y.reach);
+  const smooth = (from, axis, {smooth: taps, reach}, wanted) => filtered(from, axis, taps, reach, 1, wanted);
+  const slope = (from, axis, {slope: taps, reach}, wanted) => filtered(from, axis, taps, reach, -1, wanted);
+  const smoothX = smooth(field, 0, x, forY), slopeX = slope(field, 0, x, forY);
+  const part = (found, a, b, c, axis) => ({values: found.values, scale: scaleOf(a, b, c, perCell[axis])});
+  return [part(smooth(smooth(slopeX, 1, y, forZ), 2, z, rows), x, y, z, 0),
+    part(smooth(slope(smoothX, 1, y, forZ), 2, z, rows), y, z, x, 1),
+    part(slope(smooth(smoothX, 1, y, forZ), 2, z, rows), z, x, y, 2)];
 }
 
-/** In place, `narrow` with the direction of `wide` where this hardly differs. */
-function adapt(gradients, wide) {
-  for (let i = 0, at = 0; at < gradients.length; ++i, at += 4) {
-    const [ax, ay, az] = [gradients[at], gradients[at + 1], gradients[at + 2]];
-    const [bx, by, bz] = wide.map(({values, scale}) => scale * values[i]);
-    const a = ax * ax + ay * ay + az * az, b = bx * bx + by * by + bz * bz;
-    if (!(a > 0 && b > 0)) continue;
-    const cosine = (ax * bx + ay * by + az * bz) / Math.sqrt(a * b);
-    const part = clamp((cosine - kAdaptedDiffer) / (kAdaptedAgree - kAdaptedDiffer), 0, 1);
-    if (part === 0) continue;
-    const own = 1 - part, other = part * Math.sqrt(a / b);
-    const mixed = [own * ax + other * bx, own * ay + other * by, own * az + other * bz];
-    const back = Math.sqrt(a) / Math.hypot(...mixed);
-    for (const axis of axes) gradients[at + axis] = back * mixed[axis];
+/** In place, the narrow gradients of these rows with the direction of the wide ones where this hardly differs. */
+function adapt(gradients, wide, rows) {
+  const [{values: xs, scale: sx}, {values: ys, scale: sy}, {values: zs, scale: sz}] = wide;
+  for (let row = 0; row < rows.first.length; ++row) {
+    for (let x = rows.first[row]; x < rows.end[row]; ++x) {
+      const i = row * rows.size[0] + x, at = 4 * i;
+      const ax = gradients[at], ay = gradients[at + 1], az = gradients[at + 2];
+      const bx = sx * xs[i], by = sy * ys[i], bz = sz * zs[i];
+      const a = ax * ax + ay * ay + az * az, b = bx * bx + by * by + bz * bz;
+      if (!(a > 0 && b > 0)) continue;
+      const cosine = (ax * bx + ay * by + az * bz) / Math.sqrt(a * b);
+      const part = clamp((cosine - kAdaptedDiffer) / (kAdaptedAgree - kAdaptedDiffer), 0, 1);
+      if (part === 0) continue;
+      const own = 1 - part, other = part * Math.sqrt(a / b);
+      const mx = own * ax + other * bx, my = own * ay + other * by, mz = own * az + other * bz;
+      const back = Math.sqrt(a / (mx * mx + my * my + mz * mz));
+      gradients[at] = back * mx;
+      gradients[at + 1] = back * my;
+      gradients[at + 2] = back * mz;
+    }
   }
+}
+
+/** Which voxels of a box a point of the surface lies between, one a voxel; null: none. A point lies between eight voxels,
+ * of which some have the iso density and some have not: so those with another one around them that differs. */
+export function surfaceVoxels({size: [nx, ny, nz], density}, iso, low, high) {
+  const size = extentOf(low, high), [wide, tall, deep] = size.map(n => n + 2);
+  let counts = new Uint8Array(wide * tall * deep), solid = 0;
+  for (let z = Math.max(low[2] - 1, 0); z < Math.min(high[2] + 1, nz); ++z) {
+    for (let y = Math.max(low[1] - 1, 0); y < Math.min(high[1] + 1, ny); ++y) {
+      const from = (z * ny + y) * nx, to = ((z - low[2] + 1) * tall + y - low[1] + 1) * wide - low[0] + 1;
+      for (let x = Math.max(low[0] - 1, 0); x < Math.min(high[0] + 1, nx); ++x) {
+        if (density[from + x] >= iso) solid += counts[to + x] = 1;
+      }
+    }
+  }
+  if (solid === 0 || solid === counts.length) return null;
+  // How many of 27 are solid, axis by axis; ends of rows hold what no voxel of the box reads.
+  for (const stride of [1, wide, wide * tall]) {
+    const sums = new Uint8Array(counts.length);
+    for (let i = stride; i < counts.length - stride; ++i) sums[i] = counts[i - stride] + counts[i] + counts[i + stride];
+    counts = sums;
+  }
+  const marks = new Uint8Array(countOf(size));
+  let any = 0;
+  for (let z = 0, out = 0; z < size[2]; ++z) {
+    for (let y = 0; y < size[1]; ++y) {
+      for (let x = 0, at = ((z + 1) * tall + y + 1) * wide + 1; x < size[0]; ++x, ++at) {
+        any |= marks[out++] = counts[at] > 0 && counts[at] < 27 ? 1 : 0;
+      }
+    }
+  }
+  return any ? marks : null;
+}
+
+/** The rows of those that `has(i)`. */
+function rowsOf(size, has) {
+  const rows = new Rows(size);
+  for (let row = 0, i = 0; row < size[1] * size[2]; ++row) {
+    for (let x = 0; x < size[0]; ++x, ++i) if (has(i)) rows.take(row, x, x + 1);
+  }
+  return rows;
 }
 
 const kBlock = 32;  // cells of an edge: most of a volume is air, or solid, and has no gradient
@@ -135,7 +213,8 @@ export class CellGradients {
   constructor(volume, plan) {
     Object.assign(this, {volume, plan});
     this.grid = volume.size.map((n, axis) => Math.ceil(n / plan.cell[axis]));
-    this.means = new Float32Array(countOf(this.grid));
+    this.areVoxels = countOf(plan.cell) === 1;
+    this.means = this.areVoxels ? volume.density : new Float32Array(countOf(this.grid));
     this.perCell = axes.map(axis => plan.perEdge[axis] * plan.cell[axis]);
   }
 
@@ -144,7 +223,7 @@ export class CellGradients {
     const {cell, reachCells} = this.plan;
     const from = low.map((n, axis) => Math.floor(n / cell[axis]));
     const to = high.map((n, axis) => Math.ceil(n / cell[axis]));
-    this.gather(from, to);
+    if (!this.areVoxels) this.gather(from, to);
     return {low: from.map((n, axis) => Math.max(n - reachCells[axis], -1)),
       high: to.map((n, axis) => Math.min(n + reachCells[axis], this.grid[axis] + 1))};
   }
@@ -179,31 +258,37 @@ export class CellGradients {
     return field;
   }
 
-  /** Calls `put(low, high, gradients)` for each block of a box: four numbers a cell, the last is nothing; null: none has one. */
-  blocks({low, high}, put) {
+  /** Calls `put(low, high, gradients)` for each block of a box: four numbers a cell, the last is nothing; null: none has
+   * one. `marksOf(low, high)`: of which cells, one a cell; null: of none. Without it, of all. */
+  blocks({low, high}, put, marksOf = null) {
     for (let z = low[2]; z < high[2]; z += kBlock) {
       for (let y = low[1]; y < high[1]; y += kBlock) {
         for (let x = low[0]; x < high[0]; x += kBlock) {
           const from = [x, y, z], to = from.map((n, axis) => Math.min(n + kBlock, high[axis]));
-          put(from, to, this.gradients(from, to));
+          const marks = marksOf?.(from, to);
+          put(from, to, marks === null ? null : this.gradients(from, to, marks));
         }
       }
     }
   }
 
-  gradients(low, high) {
-    const {plan, perCell} = this;
+  /** Of the marked cells, else of all. The wide filter costs five times as much as the narrow one, and is taken where that
+   * finds anything. */
+  gradients(low, high, marks) {
+    const {plan, perCell} = this, size = extentOf(low, high);
     const around = taps => this.field(low.map((n, axis) => n - taps[axis].reach),
       high.map((n, axis) => n + taps[axis].reach));
     const field = around(plan.narrow);
     if (field.values.every(value => value === field.values[0])) return null;
-    const narrow = partsOf(plan.narrow, field, perCell);
-    const gradients = new Float32Array(4 * narrow[0].values.length);
+    const wanted = marks ? rowsOf(size, i => marks[i] !== 0) : new Rows(size, 0, size[0]);
+    const narrow = partsOf(plan.narrow, field, perCell, wanted);
+    const gradients = new Float32Array(4 * countOf(size));
     for (const axis of axes) {
       const {values, scale} = narrow[axis];
-      for (let i = 0; i < values.length; ++i) gradients[4 * i + axis] = scale * values[i];
+      for (let i = 0; i < values.length; ++i) if (!marks || marks[i] !== 0) gradients[4 * i + axis] = scale * values[i];
     }
-    adapt(gradients, partsOf(plan.wide, around(plan.wide), perCell));
+    const sloped = rowsOf(size, i => gradients[4 * i] !== 0 || gradients[4 * i + 1] !== 0 || gradients[4 * i + 2] !== 0);
+    adapt(gradients, partsOf(plan.wide, around(plan.wide), perCell, sloped), sloped);
     return gradients;
   }
 }

@@ -40,7 +40,7 @@ export class Painter {
     Object.assign(this, {gl, scene, eyes: [], volumes: []});
     const isBlend = scene.volumes.map((_, v) => kindOf(v) === 'blend');
     this.blended = isBlend.filter(blend => blend).length;
-    const most = mostBlended(gl, scene.volumes.some(({edges}, v) => isBlend[v] && cellPlan(edges)));
+    const most = mostBlended(gl, scene.volumes.some(({edges}, v) => isBlend[v] && !cellPlan(edges).cubes));
     if (this.blended > most) {
       throw new Error(`${this.blended} volumes, and this browser has texture units for ${most}; take iso`);
     }

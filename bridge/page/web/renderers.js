@@ -68,8 +68,8 @@ export class IsoCaster {
     this.iso.set({...viewUniforms(view), u_iso: volume.view.iso / 65535, u_texels: volume.texels,
       u_edges_mm: volume.view.edges,
       u_texture_from_eye: affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture))});
-    this.iso.setInts({u_has_labels: volume.volume.labels ? 1 : 0, u_has_cells: volume.gradients ? 1 : 0});
-    if (volume.gradients) this.iso.set(volume.gradients.uniforms());
+    this.iso.setInts({u_has_labels: volume.volume.labels ? 1 : 0});
+    this.iso.set(volume.gradients.uniforms());
     cover(gl);
   }
   free() {
@@ -83,8 +83,7 @@ export class BlendCaster {
     Object.assign(this, {gl, volumes});
     const each = volumes.map((_, v) => `f(${v})`).join(' ');
     const bools = of => `bool[](${volumes.map(of).join(', ')})`;
-    const cells = volumes.some(({gradients}) => gradients) ?
-      `#define KERF_HAS_CELLS ${bools(({gradients}) => gradients !== null)}\n` : '';
+    const cells = volumes.some(({plan}) => !plan.cubes) ? `#define KERF_HAS_CELLS ${bools(({plan}) => !plan.cubes)}\n` : '';
     this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n#define KERF_EACH_VOLUME(f) ${each}\n` +
       `#define KERF_HAS_LABELS ${bools(({volume}) => volume.labels !== null)}\n${cells}`);
     this.layer = new Program(gl, 'layer');
@@ -103,7 +102,7 @@ export class BlendCaster {
       this.cast.set({[`u_texels[${v}]`]: volume.texels,
         [`u_surface_mm[${v}]`]: surfaceMm(volume.view.edges) + volume.transfer.borderMm,
         [`u_fade[${v}]`]: [volume.transfer.empty, volume.transfer.full]});
-      if (!volume.gradients) return;
+      if (volume.plan.cubes) return;
       this.cast.setInts({[`u_cell_gradient[${v}]`]: this.cellsUnit + v});
       for (const [name, value] of Object.entries(volume.gradients.uniforms())) this.cast.set({[`${name}[${v}]`]: value});
     });
@@ -118,10 +117,10 @@ export class BlendCaster {
     this.cast.use();
     this.volumes.forEach((volume, v) => {
       volume.bind(kUnitsPerVolume * v);
-      if (volume.gradients) bind(gl, this.cellsUnit + v, gl.TEXTURE_3D, volume.gradients.texture);
+      if (!volume.plan.cubes) bind(gl, this.cellsUnit + v, gl.TEXTURE_3D, volume.gradients.texture);
       const textureFromEye = affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture));
       // A gradient per voxel edge, or per longest one, goes to the eye's millimetres by the transposed Jacobian.
-      const perTexture = volume.texels.map((n, axis) => n * (volume.gradients?.perEdge[axis] ?? 1));
+      const perTexture = volume.texels.map((n, axis) => n * volume.plan.perEdge[axis]);
       const turned = [0, 1, 2].flatMap(c => [0, 1, 2].map(r => textureFromEye[4 * r + c] * perTexture[c]));
       this.cast.set({[`u_texture_from_eye[${v}]`]: textureFromEye, [`u_eye_from_gradient[${v}]`]: turned});
     });

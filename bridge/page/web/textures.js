@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes on the GPU: uploaded by boxes of changed bricks.
-import {CellGradients, cellPlan, joined} from './cell_gradients.js';
+import {CellGradients, cellPlan, joined, surfaceVoxels} from './cell_gradients.js';
 import {kClearVox, kMostTapVox, kOcclusionTapsMm} from './constants.js';
 import {bind, texture} from './gl.js';
 import {scaled, translated} from './math.js';
-import {gradientTexels, MaterialTexels, transferFunction} from './transfer_function.js';
+import {gradientByte, gradientTexels, MaterialTexels, transferFunction} from './transfer_function.js';
 import {FineCells, Macrocells} from './volume.js';
 
 /** A texel for each voxel inside a border of air one voxel thick. */
@@ -134,28 +134,41 @@ class FineCellsOnGpu {
   }
 }
 
-/** The gradients of the cells of a volume with unequal edges as a texture. */
+/** Three of four numbers a texel, as vectors of length 127 in signed bytes. */
+function directionBytes(vectors) {
+  const bytes = new Int8Array(vectors.length);
+  for (let at = 0; at < vectors.length; at += 4) {
+    const size = Math.hypot(vectors[at], vectors[at + 1], vectors[at + 2]);
+    for (let i = at; size > 0 && i < at + 3; ++i) bytes[i] = Math.round(127 / size * vectors[i]);
+  }
+  return bytes;
+}
+
+/** The gradients of the cells of a volume as a texture. With an `iso` value, and if the voxels are cubes, the directions of
+ * those alone that a point of the surface lies between: half of the memory, and a fourth of the time. */
 class CellGradientsOnGpu {
-  constructor(gl, volume, plan) {
-    this.gl = gl;
+  constructor(gl, volume, plan, iso) {
+    Object.assign(this, {gl, iso, directions: iso !== null && plan.cubes});
     this.cells = new CellGradients(volume, plan);
     this.size = this.cells.grid.map(n => n + 2);
-    this.texture = texture(gl, gl.TEXTURE_3D, gl.RGBA16F, gl.LINEAR, this.size);
+    this.texture = texture(gl, gl.TEXTURE_3D, this.directions ? gl.RGBA8_SNORM : gl.RGBA16F, gl.LINEAR, this.size);
   }
   /** After the voxels of these boxes have changed. */
   update(boxes) {
-    const {gl, cells} = this;
+    const {gl, cells, iso, directions} = this;
     gl.bindTexture(gl.TEXTURE_3D, this.texture);
+    const upload = (low, high, type, texels) => gl.texSubImage3D(gl.TEXTURE_3D, 0, ...low.map(n => n + 1),
+      ...high.map((n, axis) => n - low[axis]), gl.RGBA, type, texels);
     for (const box of joined(boxes.map(one => cells.update(one)))) {
-      cells.blocks(box, (low, high, gradients) => {
-        const size = high.map((n, axis) => n - low[axis]);
-        gl.texSubImage3D(gl.TEXTURE_3D, 0, low[0] + 1, low[1] + 1, low[2] + 1, ...size, gl.RGBA, gl.FLOAT,
-          gradients ?? new Float32Array(4 * size[0] * size[1] * size[2]));
-      });
+      if (directions) {
+        // Where there are none, none is read.
+        cells.blocks(box, (low, high, found) => found && upload(low, high, gl.BYTE, directionBytes(found)),
+          (low, high) => surfaceVoxels(cells.volume, iso, low, high));
+      } else {
+        cells.blocks(box, (low, high, found) => upload(low, high, gl.FLOAT,
+          found ?? new Float32Array(4 * high.reduce((count, n, axis) => count * (n - low[axis]), 1))));
+      }
     }
-  }
-  get perEdge() {
-    return this.cells.plan.perEdge;
   }
   /** From texture coordinates of the voxels, inside of their border of one, to those of the cells. */
   uniforms() {
@@ -177,12 +190,11 @@ class VolumeOnGpu {
     this.texels = this.volume.size.map(n => n + 2);
     this.worldFromTexture = scaled(translated(view.worldFromVoxel, [-1.5, -1.5, -1.5]), this.texels);
     this.cells = new CellsOnGpu(gl, view, threshold);
-    const plan = cellPlan(view.edges);
-    this.gradients = plan && new CellGradientsOnGpu(gl, this.volume, plan);  // null: of cubes
+    this.plan = cellPlan(view.edges);
     const tapMm = Math.max(...kOcclusionTapsMm, kClearVox * Math.max(...view.edges));
     /** Voxels, by axis, over which a changed one is seen in the shading of a surface. */
     this.shadingReach = view.edges.map((edge, axis) =>
-      Math.max(Math.min(tapMm / edge, kMostTapVox), plan?.reach[axis] ?? 0) + 1);
+      Math.max(Math.min(tapMm / edge, kMostTapVox), this.plan.reach[axis]) + 1);
     this.stale = this.volume.follow();
   }
   /** Takes up what changed; returns those bricks. */
@@ -193,7 +205,7 @@ class VolumeOnGpu {
     this.gl.pixelStorei(this.gl.UNPACK_ALIGNMENT, 1);
     const boxes = boxesOf(this.volume, bricks);
     for (const {low, high} of boxes) this.upload(low, high);
-    this.gradients?.update(boxes);
+    this.gradients.update(boxes);
     this.updateCells(this.cells.cells.touched(bricks));
     return bricks;
   }
@@ -203,7 +215,7 @@ class VolumeOnGpu {
   free() {
     this.volume.forget(this.stale);
     this.cells.free();
-    this.gradients?.free();
+    this.gradients.free();
   }
 }
 
@@ -211,6 +223,7 @@ class VolumeOnGpu {
 export class SolidOnGpu extends VolumeOnGpu {
   constructor(gl, view) {
     super(gl, view, view.iso);
+    this.gradients = new CellGradientsOnGpu(gl, this.volume, this.plan, view.iso);
     this.fineCells = new FineCellsOnGpu(gl, view, this.cells.cells);
     this.density = new VoxelTexture(gl, this.volume.size, gl.RG8, gl.RG, gl.LINEAR);
     const labelled = this.volume.labels ? this.volume.size : [0, 0, 0];
@@ -229,7 +242,7 @@ export class SolidOnGpu extends VolumeOnGpu {
     bind(this.gl, 1, this.gl.TEXTURE_3D, this.labels.texture);
     bind(this.gl, 2, this.gl.TEXTURE_3D, this.cells.texture);
     bind(this.gl, 3, this.gl.TEXTURE_3D, this.fineCells.texture);
-    bind(this.gl, 6, this.gl.TEXTURE_3D, this.gradients?.texture ?? null);
+    bind(this.gl, 6, this.gl.TEXTURE_3D, this.gradients.texture);
   }
   free() {
     super.free();
@@ -239,25 +252,55 @@ export class SolidOnGpu extends VolumeOnGpu {
   }
 }
 
+/** The gradients of cubes, and the densities, in the texels of a volume. */
+class GradientTexels {
+  constructor(volume, plan, voxels) {
+    Object.assign(this, {volume, voxels, cells: new CellGradients(volume, plan)});
+    this.begun = false;
+  }
+  /** After the voxels of these boxes have changed. */
+  update(boxes) {
+    const {volume, voxels, cells} = this;
+    const within = ({low, high}) =>
+      ({low: low.map(n => Math.max(n, 0)), high: high.map((n, axis) => Math.min(n, volume.size[axis]))});
+    for (const box of joined(boxes.map(one => within(cells.update(one))))) {
+      cells.blocks(box, (low, high, gradients) => {
+        const texels = gradientTexels(volume, low, high, !this.begun && !gradients);
+        if (!texels) return;  // as the texture is at first
+        for (let at = 0; gradients && at < texels.length; ++at) {
+          if (at % 4 < 3) texels[at] = gradientByte(gradients[at]);
+        }
+        voxels.upload(low, high, texels);
+      });
+    }
+    this.begun = true;
+  }
+  free() {}
+}
+
 /** Gradient and density in one texture, materials in a second where there are labels. */
 export class TranslucentOnGpu extends VolumeOnGpu {
   constructor(gl, view, materials, rows) {
     const transfer = transferFunction(view, materials);
     super(gl, view, transfer.lowestSeen);
     this.transfer = transfer;
-    const {labels, size} = this.volume;
+    const {volume, plan} = this, {labels, size} = volume;
     this.voxels = new VoxelTexture(gl, size, gl.RGBA8, gl.RGBA, gl.LINEAR);
     this.voxels.fill([128 / 255, 128 / 255, 128 / 255, 0]);
+    this.gradients = plan.cubes ? new GradientTexels(volume, plan, this.voxels) :
+      new CellGradientsOnGpu(gl, volume, plan, null);
     this.materials = new VoxelTexture(gl, labels ? size : [0, 0, 0], gl.RGBA8, gl.RGBA, gl.LINEAR);
     this.materialTexels = labels ? new MaterialTexels(this.volume, rows) : null;
   }
   upload(low, high) {
-    // A gradient reaches a voxel farther.
-    const from = low.map(n => Math.max(n - 1, 0));
-    const to = high.map((n, axis) => Math.min(n + 1, this.volume.size[axis]));
-    const texels = gradientTexels(this.volume, from, to, !this.begun);
-    if (!texels) return;  // as the texture is at first
-    this.voxels.upload(from, to, texels);
+    if (!this.plan.cubes) {
+      // A gradient reaches a voxel farther.
+      const from = low.map(n => Math.max(n - 1, 0));
+      const to = high.map((n, axis) => Math.min(n + 1, this.volume.size[axis]));
+      const texels = gradientTexels(this.volume, from, to, !this.begun);
+      if (!texels) return;  // as the texture is at first
+      this.voxels.upload(from, to, texels);
+    }
     if (this.materialTexels) this.materials.upload(low, high, this.materialTexels.of(low, high));
   }
   /** Other colours and opacities: of labels; by density the palette has them. */

@@ -75,6 +75,8 @@ export function transferFunction(view, materials) {
 
 export const leastExtinction = -Math.log2(1 - kLeastOpacity) / kOpacityMm;  // per mm
 
+/** Of a part of a gradient, a step over two edges being 1. */
+export const gradientByte = part => Math.trunc(part * 127 + 128.5);
 const densityByte = density => Math.floor((density * 255 + 32767) / kFull);
 
 /**
@@ -97,7 +99,7 @@ export function gradientTexels(volume, low, high, skipAir) {
   }
   if (skipAir && any === 0) return null;
   const texels = new Uint8Array(4 * (wide - 2) * (tall - 2) * (deep - 2));
-  const byte = sum => Math.trunc(sum / (4 * kFull) * 127 + 128.5);
+  const byte = sum => gradientByte(sum / (4 * kFull));
   const up = wide, far = wide * tall;
   let out = 0;
   for (let z = 1; z < deep - 1; ++z) {

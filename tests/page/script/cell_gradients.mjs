@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of unequal voxels as the page computes them, beside those of C++ (tests/visualizer/view/page_gradient_test.cpp).
+// Gradients of voxels as the page computes them, beside those of C++ (tests/visualizer/view/page_gradient_test.cpp).
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import test from 'node:test';
-import {CellGradients, cellPlan, joined} from './cell_gradients.js';
+import {CellGradients, cellPlan, joined, surfaceVoxels} from './cell_gradients.js';
 import {Volume} from './volume.js';
 
 const stored = JSON.parse(fs.readFileSync('cell_gradients.json', 'utf8'));
@@ -23,7 +23,7 @@ function volumeOf(size, densityAt) {
 const wholeOf = ({size}) => ({low: [0, 0, 0], high: size});
 
 /** Gradients of all cells, the border's too: by place. */
-function gradientsOf(cells, boxes, made = new Map()) {
+function gradientsOf(cells, boxes, made = new Map(), marksOf = null) {
   for (const box of boxes) {
     cells.blocks(box, (low, high, gradients) => {
       let at = 0;
@@ -32,7 +32,7 @@ function gradientsOf(cells, boxes, made = new Map()) {
           for (let x = low[0]; x < high[0]; ++x, at += 4) made.set(`${x},${y},${z}`, gradients ? [...gradients.subarray(at, at + 3)] : [0, 0, 0]);
         }
       }
-    });
+    }, marksOf);
   }
   return made;
 }
@@ -55,10 +55,10 @@ test('filters are those of C++, whichever axis is the long one', () => {
   }
 });
 
-test('cubes have none, edges that were rounded are cubes', () => {
-  assert.equal(cellPlan([0.1, 0.1, 0.1]), null);
-  assert.equal(cellPlan([0.1, 0.1004, 0.1]), null);
-  assert.notEqual(cellPlan([0.1, 0.102, 0.1]), null);
+test('edges that were rounded are those of cubes', () => {
+  assert.deepEqual(cellPlan([0.1, 0.1004, 0.1]), cellPlan([0.1, 0.1, 0.1]));
+  assert.equal(cellPlan([0.1, 0.1004, 0.1]).cubes, true);
+  assert.equal(cellPlan([0.1, 0.102, 0.1]).cubes, false);
 });
 
 test('gradients are those of C++', () => {
@@ -82,7 +82,7 @@ test('gradients are those of C++', () => {
 test('after cuts they are those of the whole volume made anew, and none beyond the reach differs', () => {
   let seed = 7;
   const random = n => (seed = seed * 1103515245 + 12345 & 0x7fffffff) % n;
-  for (const edges of [[1, 1, 1.5], [1, 1, 2], [5, 1, 1], [1, 2, 8], [1, 1, 100]]) {
+  for (const edges of [[1, 1, 1], [1, 1, 1.5], [1, 1, 2], [5, 1, 1], [1, 2, 8], [1, 1, 100]]) {
     const plan = cellPlan(edges);
     const volume = volumeOf([40, 33, 21], (x, y, z) => Math.hypot(x - 20, y - 16, z - 10) < 9 ? 65535 : random(900));
     const cells = new CellGradients(volume, plan);
@@ -108,6 +108,24 @@ test('after cuts they are those of the whole volume made anew, and none beyond t
       }
     }
   }
+});
+
+test('voxels that a point of the surface lies between have the gradient that they have among all, the others none', () => {
+  const size = [40, 37, 35], iso = 30000;
+  const volume = volumeOf(size, (x, y, z) => Math.hypot(x - 34, y - 16, z - 10) < 12 && x !== 30 ? 65535 : 9 * ((7 * x + 11 * y + 13 * z) % 29));
+  const solid = at => at.every((n, axis) => n >= 0 && n < size[axis]) && volume.density[(at[2] * size[1] + at[1]) * size[0] + at[0]] >= iso;
+  const cells = new CellGradients(volume, cellPlan([1, 1, 1])), box = cells.update(wholeOf(volume));
+  const all = gradientsOf(cells, [box]);
+  const marked = gradientsOf(cells, [box], new Map(), (low, high) => surfaceVoxels(volume, iso, low, high));
+  let count = 0;
+  for (const [place, gradient] of marked) {
+    const at = place.split(',').map(Number);
+    const around = Array.from({length: 27}, (_, i) => solid(at.map((n, axis) => n + Math.floor(i / 3 ** axis) % 3 - 1)));
+    const lies = around.includes(true) && around.includes(false);
+    assert.deepEqual(gradient, lies ? all.get(place) : [0, 0, 0], place);
+    count += lies ? 1 : 0;
+  }
+  assert.ok(count > 2000 && count < 0.2 * marked.size, `${count} of ${marked.size}`);
 });
 
 test('layers one upon the other are filtered as one box, cuts far from each other as two', () => {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the page repeats in JavaScript of the gradient of unequal voxels: here and in
+// What the page repeats in JavaScript of the gradient of voxels: here and in
 // tests/page/script/cell_gradients.mjs filters and gradients are those of cell_gradients.json,
 // which KERF_GOLDEN=renew in the environment makes anew.
 #include <algorithm>
@@ -24,11 +24,11 @@ namespace {
 
 using Edges = std::array<double, 3>;
 
-constexpr Edges kPlans[]{{1, 1, 1.5}, {1, 1, 2},   {1, 1, 3.7}, {1, 1, 5},  {1, 1, 10},
-                         {1, 5, 5},   {1, 10, 10}, {1, 2, 8},   {1, 3, 10}, {1, 1, 100}};
+constexpr Edges kPlans[]{{1, 1, 1}, {1, 1, 1.5}, {1, 1, 2}, {1, 1, 3.7}, {1, 1, 5},  {1, 1, 10},
+                         {1, 5, 5}, {1, 10, 10}, {1, 2, 8}, {1, 3, 10},  {1, 1, 100}};
 /// With cells of an odd number of voxels: the middle one has the gradient of its cell, which
 /// nothing in the body below turns.
-constexpr Edges kVolumes[]{{1, 1, 1.5}, {1.7, 1, 1.2}, {1, 1, 3}, {3, 1, 3.2}};
+constexpr Edges kVolumes[]{{1, 1, 1}, {1, 1, 1.5}, {1.7, 1, 1.2}, {1, 1, 3}, {3, 1, 3.2}};
 constexpr VoxelGrid kGrid{15, 12, 9};
 
 GradientPlan plan_of(const Edges& edges) {
@@ -114,7 +114,7 @@ void check_like(const ReadJson& stored, const VoxelIndex& cell,
 
 }  // namespace
 
-TEST_CASE("filters and gradients of unequal voxels are those that the page is compared with") {
+TEST_CASE("filters and gradients of voxels are those that the page is compared with") {
   const char* const file = KERF_TEST_PAGE_GRADIENTS;
   const char* const wish = std::getenv("KERF_GOLDEN");
   if (wish != nullptr && std::string_view(wish) == "renew") {
