@@ -90,7 +90,7 @@ def check(ablations):
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for file in mutate.tracked():
-            if re.match(r"(controller/.*\.[ch]pp|shared/.*\.hpp)$", file):
+            if re.match(r"(controller/.*\.[ch]pp|(shared|include)/.*\.hpp)$", file):
                 (folder / file).parent.mkdir(parents=True, exist_ok=True)
                 (folder / file).write_text(changed.get(file) or (ROOT / file).read_text())
         (folder / "ablated.hpp").write_text(SWITCHES)

@@ -8,7 +8,7 @@
 set -euo pipefail
 here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 cd "${1:-$here/..}"
-mapfile -t headers < <(find shared controller record hil standin lab visualizer bridge web tests -name '*.hpp' | sort)
+mapfile -t headers < <(find include shared controller record replay arm hil standin lab face visualizer bridge web tests -name '*.hpp' | sort)
 
 # As in CMakeLists.txt; of each, the names by which a header shows that it needs it.
 needs='
@@ -40,6 +40,7 @@ by_text() {
       return if $into->{$file}++;
       $into->{$1} = 1 while ($text{$file} // "") =~ /^#include <([^>]+)>/mg;
       my @below = ($text{$file} // "") =~ /^#include "([^"]+)"/mg;
+      s{^kerf/}{include/kerf/} for @below;  # as other programs include it
       closure($_, $into) for @below;
     }
     for my $file (@headers) {
@@ -62,7 +63,7 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-compiler="clang++-$("$here/../cmake/clang-version.sh") -std=c++20 -I. -Istandin/include $(pkg-config --cflags epoxy imgui glfw3) $(printf -- '-isystem %s ' /usr/include/gdcm-*)"
+compiler="clang++-$("$here/../cmake/clang-version.sh") -std=c++20 -I. -Iinclude -Istandin/include $(pkg-config --cflags epoxy imgui glfw3) $(printf -- '-isystem %s ' /usr/include/gdcm-*)"
 compiler+=" -DBOOST_ASIO_HAS_CO_AWAIT -DBOOST_ASIO_HAS_STD_COROUTINE"  # as bridge/CMakeLists.txt
 awk 'BEGIN { print "#define KERF_VERSION \"\"" } NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
 # Templates that it asks for are made here, not again for each header.
@@ -80,7 +81,7 @@ in_chains() {
     for my $file (@headers) {
       local $/;
       open my $in, "<", $file or die;
-      $includes{$file} = [<$in> =~ /^#include [<"]([^">]+)/mg];
+      $includes{$file} = [map { s{^kerf/}{include/kerf/}r } <$in> =~ /^#include [<"]([^">]+)/mg];
     }
     sub closure {
       my ($file) = @_;

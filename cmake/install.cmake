@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # `cmake --install`, in two components. kerf: programs, ./kerf itself as `kerf`, what they need, man pages,
 # completion, docs. development: what a project of one's own needs to build upon kerf (docs/packages.md):
-# headers, static libraries, find_package(kerf).
+# include/kerf, libkerf, find_package(kerf).
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME kerf)
@@ -24,14 +24,38 @@ function(kerf_libraries out folder)
   set(${out} ${found} PARENT_SCOPE)
 endfunction()
 
-set(libraries kerf_options)
-foreach(part shared controller record replay hil lab)
-  kerf_libraries(more ${PROJECT_SOURCE_DIR}/${part})
-  list(APPEND libraries ${more})
+# libkerf: the objects of all libraries that include/kerf stands before, and the libraries of others that they need.
+set(objects "")
+set(others "")
+foreach(part shared controller record replay hil lab face)
+  kerf_libraries(libraries ${PROJECT_SOURCE_DIR}/${part})
+  foreach(library ${libraries})
+    get_target_property(type ${library} TYPE)
+    if(type STREQUAL "STATIC_LIBRARY")
+      list(APPEND objects $<TARGET_OBJECTS:${library}>)
+    endif()
+    foreach(property LINK_LIBRARIES INTERFACE_LINK_LIBRARIES)
+      get_target_property(needed ${library} ${property})
+      if(needed)
+        list(APPEND others ${needed})
+      endif()
+    endforeach()
+  endforeach()
 endforeach()
-foreach(library ${libraries})  # kerf_law is kerf::law
-  string(REGEX REPLACE "^kerf_" "" name ${library})
-  set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})
+list(FILTER others EXCLUDE REGEX "kerf_|LINK_ONLY|BUILD_INTERFACE")
+list(REMOVE_DUPLICATES others)
+add_library(kerf STATIC ${objects} $<TARGET_OBJECTS:kerf_allocation_counter>)
+set_target_properties(kerf PROPERTIES LINKER_LANGUAGE CXX)
+target_compile_features(kerf INTERFACE cxx_std_20)
+target_include_directories(kerf INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
+target_compile_options(kerf INTERFACE -ffp-contract=off)  # a fused multiply-add changes bits between machines
+target_link_libraries(kerf INTERFACE ${others})
+set(main_objects "")
+foreach(program controller lab replay)  # for programs with laws of one's own
+  add_library(kerf_main_${program} OBJECT ${program}/main.cpp)
+  target_link_libraries(kerf_main_${program} PRIVATE $<BUILD_INTERFACE:kerf_${program}>)
+  set_target_properties(kerf_main_${program} PROPERTIES EXPORT_NAME main_${program})
+  list(APPEND main_objects kerf_main_${program})
 endforeach()
 
 set(programs kerf-arm kerf-controller kerf-emulator kerf-lab kerf-record kerf-recorder kerf-replay kerf-volume)
@@ -91,16 +115,17 @@ set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/kerf-dev)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/kerf)
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/kerf)
-install(TARGETS ${libraries} EXPORT kerf
-  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/kerf INCLUDES DESTINATION ${headers})
+install(TARGETS kerf ${main_objects} EXPORT kerf
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} OBJECTS DESTINATION ${CMAKE_INSTALL_LIBDIR}/kerf
+  INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} ${headers}/private)
 install(EXPORT kerf NAMESPACE kerf:: DESTINATION ${package} FILE kerf-targets.cmake)
-install(DIRECTORY shared controller record replay hil lab DESTINATION ${headers}
-  FILES_MATCHING PATTERN *.hpp)
-# What each program compiles for itself: a main, and the allocator that counts.
-foreach(program controller lab replay)
-  install(FILES ${program}/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/${program})
+install(DIRECTORY include/kerf/ DESTINATION ${headers})
+# What kerf/law.hpp needs, since a law is a template: no interface.
+foreach(header controller/law/law.hpp controller/law/virtual_coupling.hpp controller/law/registry/law_registry.hpp
+    shared/numeric/numbers.hpp shared/numeric/vec.hpp)
+  get_filename_component(folder ${header} DIRECTORY)
+  install(FILES ${header} DESTINATION ${headers}/private/${folder})
 endforeach()
-install(FILES controller/loop/allocation_counter.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf)
 
 foreach(port usb hid)  # what these need, the project needs, too
   set(kerf_has_${port} OFF)

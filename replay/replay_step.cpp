@@ -4,10 +4,7 @@
 #include <cstddef>
 #include <span>
 
-#include "controller/loop/publisher.hpp"
-#include "shared/segment/writer.hpp"
-#include "shared/volume/brick_grid.hpp"
-#include "shared/volume/checksum.hpp"
+#include "controller/tick/tick_record.hpp"
 
 namespace kerf {
 namespace {
@@ -31,16 +28,7 @@ std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded) noexce
 }
 
 std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& recorded) noexcept {
-  const TickCommands commands = commands_of(of_arms(recorded, servo));
-  // As the loop does: the reader's command, the ticks that were missed, then the restart after a
-  // stall, then the step.
-  if (commands.command.kind != ServoCommand::Kind::none) {
-    static_cast<void>(servo.apply(commands.command));
-  }
-  apply_missed(commands.missed, servo);
-  if (commands.fade_in) {
-    static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
-  }
+  static_cast<void>(apply_commands(commands_of(of_arms(recorded, servo)), servo));
   const auto reports = reports_of(recorded);
   std::array<ServoOutput, kMaxArms> outputs;
   servo.step(of_arms(reports, servo), of_arms(outputs, servo));
@@ -53,17 +41,13 @@ ArmRecords ReplayStep::operator()(const ArmRecords& recorded) noexcept {
 
 ArmRecords ReplayStep::of(const ArmRecords& recorded,
                           const std::array<ServoOutput, kMaxArms>& outputs) noexcept {
-  const auto hash_of = [&](std::size_t v, const VoxelBox& box) {
-    return changed_box_hash(BrickGrid::of(servo_.grid(v)), servo_.density(v), box);
-  };
+  const auto reports = reports_of(recorded);
   ArmRecords records{};
+  make_records(servo_, of_arms(reports, servo_), commands_of(of_arms(recorded, servo_)),
+               of_arms(outputs, servo_), volume_chain_, of_arms(records, servo_));
   for (std::size_t arm = 0; arm < servo_.arms(); ++arm) {
-    TickRecord& record = records[arm];
-    record = record_of(report_of(recorded[arm]), commands_of(recorded[arm]), outputs[arm]);
-    put_changes(outputs[arm], hash_of, volume_chain_, record);
-    record.penetration_mm = static_cast<float>(servo_.penetration_mm(arm));
-    copy_times(recorded[arm], record);
-    record.crc32c = tick_record_crc(record);
+    copy_times(recorded[arm], records[arm]);
+    records[arm].crc32c = tick_record_crc(records[arm]);
   }
   return records;
 }

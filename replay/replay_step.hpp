@@ -18,12 +18,12 @@ using ArmRecords = std::array<TickRecord, kMaxArms>;
 
 /// The records, reports or outputs of the arms that a servo has.
 template <class T>
-[[nodiscard]] std::span<T> of_arms(std::array<T, kMaxArms>& all, const Servo& servo) noexcept {
+[[nodiscard]] std::span<T> of_arms(std::array<T, kMaxArms>& all, const AnyServo& servo) noexcept {
   return std::span(all).first(servo.arms());
 }
 template <class T>
 [[nodiscard]] std::span<const T> of_arms(const std::array<T, kMaxArms>& all,
-                                         const Servo& servo) noexcept {
+                                         const AnyServo& servo) noexcept {
   return std::span(all).first(servo.arms());
 }
 

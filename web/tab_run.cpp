@@ -2,11 +2,8 @@
 #include "web/tab_run.hpp"
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <deque>
 #include <span>
-#include <sstream>
 #include <utility>
 
 #include "bridge/wire/messages.hpp"
@@ -16,6 +13,8 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
 #include "controller/plan/compile.hpp"
+#include "face/emulated_hand.hpp"
+#include "face/lock_step_port.hpp"
 #include "hil/device/emulator.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
@@ -27,7 +26,6 @@
 #include "shared/segment/writer.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
-#include "web/tab_port.hpp"
 
 namespace kerf::web {
 namespace {
@@ -40,31 +38,13 @@ Personality personality_of(const std::string& word) {
   return static_cast<Personality>(found - kPersonalityWords.begin());
 }
 
-/// As `./kerf demo` hands it over: through the text that `kerf-emulator --describe` prints.
-std::array<double, 3> told_torque_scale(Personality personality) {
-  std::array<double, 3> scale = torque_scale_of(personality);
-  for (double& axis : scale) {
-    std::ostringstream text;
-    text << axis;
-    axis = std::strtod(text.str().c_str(), nullptr);
-  }
-  return scale;
-}
-
-/// Likewise: through `hand_unit_mm` of `--emulator-args`.
-double told_unit_mm(const LoadedScene& scene) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.9g", hand_unit_mm(scene));
-  return std::strtod(text, nullptr);
-}
-
 SceneSource source_of(const TabInputs& inputs) {
   SceneSource source{inputs.scene_name, inputs.scene, {}};
   for (const std::string& setting : inputs.settings) {
     source.overrides.settings.push_back(parse_setting(setting));
   }
   source.overrides.personality = personality_of(inputs.device);
-  source.overrides.torque_scale = told_torque_scale(*source.overrides.personality);
+  source.overrides.torque_scale = torque_scale_in_text(*source.overrides.personality);
   source.overrides.pedal = inputs.pedal;
   return source;
 }
@@ -72,15 +52,7 @@ SceneSource source_of(const TabInputs& inputs) {
 HandScript hand_of(const TabInputs& inputs, const LoadedScene& scene) {
   HandScript script;  // one that only a user leads goes to its start
   if (!inputs.hand.empty()) script = parse_hand_script(inputs.hand, "hand");
-  if (!script.unit_mm) script.unit_mm = told_unit_mm(scene);
-  return script;
-}
-
-std::unique_ptr<DeviceModel> model_of(Personality personality, const HandScript& script) {
-  return with_device_params(personality, [&](auto params) {
-    take_plant(script.plant, params);
-    return make_model(params);
-  });
+  return with_unit(std::move(script), scene);
 }
 
 /// A tab has one hand. Throws LoadError.
@@ -107,11 +79,9 @@ struct TabRun::State {
         scene(one_armed(load_scene(source))),
         servo(plan_scene(scene)),
         writer(segment_of(scene, source)),
-        emulator(model_of(scene.device.personality, hand_of(inputs, scene)),
+        emulator(model_for(scene.device.personality, hand_of(inputs, scene)),
                  hand_of(inputs, scene)),
-        port(emulator, kCyclesPerSecond / scene.servo.rate_hz,
-             scene.device.personality == Personality::omni ||
-                 is_cartesian(scene.device.personality)),
+        port(emulator, scene.device.personality, scene.servo.rate_hz),
         driver(make_driver(scene.device.personality, port, scene.device.encoder_sign,
                            scene.servo.rate_hz)),
         viewer(writer, [this](const bridge::CommandMessage& asked) { return answer(asked); }),
@@ -136,8 +106,8 @@ struct TabRun::State {
       given.command = servo_command(commands.front());
       given.last_index = commands.front().index;
       commands.pop_front();
-      static_cast<void>(servo->apply(given.command));
     }
+    static_cast<void>(apply_commands(given, *servo));
     output = servo->step(report);
     timing.lost_packets[0] = driver->lost();
     timing.refused_packets[0] = driver->refused();
@@ -173,7 +143,7 @@ struct TabRun::State {
   std::unique_ptr<CompiledScene> servo;
   SegmentWriter writer;
   Emulator emulator;
-  TabPort port;
+  LockStepPort port;
   std::unique_ptr<DeviceDriver> driver;
   TabViewer viewer;
   Publisher publisher;

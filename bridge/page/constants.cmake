@@ -67,7 +67,7 @@ string(APPEND text "};\n")
 constants(bridge/wire/messages.hpp kProtocol kMaxRawBytes kHelloMagic kFrameMagic kRecordsMagic kReplyMagic
   kAckMagic kCommandMagic kViewMagic kMayCommand kTwoArms kPacked kLastOfPass kRunEnded)
 enumeration(bridge/wire/messages.hpp CloseCode)
-constants(shared/segment/layout.hpp kFlagContact kFlagDeviceFault kFlagForbidden kFlagRefused kFlagShaft)
+constants(include/kerf/tick.hpp kFlagContact kFlagDeviceFault kFlagForbidden kFlagRefused kFlagShaft)
 enumeration(shared/segment/layout.hpp Lifecycle)
 enumeration(shared/segment/command.hpp CommandKind)
 enumeration(shared/segment/command.hpp ReplyStatus)

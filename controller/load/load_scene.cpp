@@ -184,7 +184,7 @@ void check_overrides(const SceneOverrides& overrides) {
 }
 
 /// Kind and torque scale of one device or of both.
-void replace_devices(const SceneOverrides& overrides, Scene& scene) {
+void replace_devices(const SceneOverrides& overrides, SceneSpec& scene) {
   const auto replace = [&](DeviceSettings& device,
                            const std::optional<std::array<double, 3>>& torque_scale) {
     if (overrides.personality && *overrides.personality != device.personality) {
@@ -209,7 +209,7 @@ void replace_devices(const SceneOverrides& overrides, Scene& scene) {
   }
 }
 
-void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
+void apply_overrides(const SceneOverrides& overrides, SceneSpec& scene) {
   check_overrides(overrides);
   VolumeSpec& first = scene.volumes.front();
   if (overrides.volume_file) {
@@ -332,7 +332,7 @@ void fit_cutting(double grown, double scale, LoadedScene& scene) {
 }
 
 /// Fits a scene to its first volume, as the header describes.
-void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
+void fit_to_volume(double written_mm, SceneSpec& spec, LoadedScene& scene) {
   const double grown = touched_volumes(scene.volumes).voxel_mm / written_mm;
   for (ToolSpec& tool : spec.tools) {
     tool.size.radius_mm *= grown;
@@ -375,7 +375,7 @@ const ToolMesh* mesh_of(const std::string& tool, const RecordedInputs& recorded)
 
 /// How far the second device's origin lies from the first one's, mm of the hands; 0 unless the
 /// scene says both.
-Point3 arms_apart_mm(const Scene& spec) {
+Point3 arms_apart_mm(const SceneSpec& spec) {
   Point3 apart_mm{};
   if (!spec.second || !spec.offset_given || !spec.second->offset_given) return apart_mm;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -401,7 +401,7 @@ void finish_second_arm(const Point3& apart_mm, bool of_command_line, LoadedScene
   }
 }
 
-void load_tools(const Scene& spec, const std::filesystem::path& folder,
+void load_tools(const SceneSpec& spec, const std::filesystem::path& folder,
                 const SceneOverrides& overrides, const RecordedInputs& recorded, bool fitted,
                 LoadedScene& scene) {
   const SolidExtent touched = touched_volumes(scene.volumes);
@@ -420,7 +420,7 @@ void load_tools(const Scene& spec, const std::filesystem::path& folder,
 }
 
 /// `first`: the image of the first volume, in place of its file.
-LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
+LoadedScene load_parsed(SceneSpec spec, const std::filesystem::path& path,
                         const SceneOverrides& overrides, VolumeImage* first,
                         RecordedInputs recorded = {}) {
   const double written_mm =
@@ -486,9 +486,10 @@ LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
                      nullptr, std::move(recorded));
 }
 
-LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
-                       VolumeImage first) {
-  return load_parsed(parse_scene(text, path), path, {}, &first);
+LoadedScene load_scene(const std::filesystem::path& path, std::string_view text, VolumeImage first,
+                       const SceneOverrides& overrides) {
+  return load_parsed(parse_scene(text, path, scene_keys(), overrides.settings), path, overrides,
+                     &first);
 }
 
 double device_stiffness_n_per_mm(const LoadedScene& scene) {

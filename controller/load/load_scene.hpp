@@ -91,7 +91,7 @@ struct RecordedInputs {
 /// The same before files are written: a scene whose text will be written to `path`, and the
 /// densities and labels of its first volume, whose window there is [0, 65535].
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
-                                     VolumeImage first);
+                                     VolumeImage first, const SceneOverrides& overrides = {});
 
 /// Stiffness in N/mm at the device port: of the coupling to the proxy; of the paper's force when
 /// the active tool, taken as a ball of its radius, first touches a flat face: s^2 2 pi R p0.

@@ -189,15 +189,13 @@ class SilentDevices {
   std::array<std::uint64_t, kMaxArms> ticks_{};
 };
 
-/// Applies at most one command of a reader.
-void take_command(SegmentServer& server, Servo& servo, Tick tick, TickCommands& commands,
-                  RunRecord& record) noexcept {
+/// At most one command of a reader.
+void take_command(SegmentServer& server, TickCommands& commands) noexcept {
   commands.command = {};
   const auto command = server.take_command();
   if (!command) return;
   commands.command = servo_command(*command);
   commands.last_index = command->index;
-  if (!servo.apply(commands.command)) record.add_event(tick, "refused_command");
 }
 
 void count_packets(const Devices& devices, TickTiming& timing) noexcept {
@@ -219,9 +217,9 @@ void signal_tick(LoopSignals& signals, Tick tick, std::span<const DeviceReport> 
 
 }  // namespace
 
-EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& publisher,
-                    SegmentServer& server, const LoopLimits& limits, LoopSignals& signals,
-                    RunRecord& record) noexcept {
+EndReason run_servo(TickSource& clock, const Devices& devices, AnyServo& servo,
+                    Publisher& publisher, SegmentServer& server, const LoopLimits& limits,
+                    LoopSignals& signals, RunRecord& record) noexcept {
   EndReason end = EndReason::stopped;
   TickCommands commands;
   const CountedAllocations counted;
@@ -242,11 +240,11 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     for (std::size_t a = 0; a < reports.size(); ++a) {
       reports[a] = devices[a].read();  // newest pose; never blocks
     }
-    take_command(server, servo, tick, commands, record);
+    take_command(server, commands);
     commands.missed = missed.next(clock.overruns());
-    apply_missed(commands.missed, servo);
-    const char* const stall = recover(signals, clock.stood_still(), servo);
+    const char* const stall = stall_before(signals, clock.stood_still());
     commands.fade_in = stall != nullptr;
+    if (!apply_commands(commands, servo)) record.add_event(tick, "refused_command");
     if (commands.fade_in) record.add_event(tick, stall);
     const std::int64_t in_hand_ns = monotonic_ns();
     servo.step(reports, outputs);  // all physics, all limits

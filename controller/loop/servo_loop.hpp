@@ -111,14 +111,12 @@ struct LoopSignals {
   std::array<std::atomic<Waiting>, kMaxArms> waiting{Waiting::report, Waiting::report};
 };
 
-/// Before the step of a tick, if the servo has stood still: fades the force in again from 0. Its
-/// watchdog detects that, or the clock if the watchdog stood still too. Returns the name of the
-/// detector, or nullptr.
-inline const char* recover(LoopSignals& signals, bool stood_still, Servo& servo) noexcept {
-  const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
-  if (!watchdog_tripped && !stood_still) return nullptr;
-  static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
-  return watchdog_tripped ? "watchdog" : "stood_still";
+/// Before the step of a tick: who found that the servo has stood still, its watchdog, or the clock
+/// if the watchdog stood still too; nullptr if it has not. The force then fades in again from 0
+/// (`TickCommands::fade_in`).
+inline const char* stall_before(LoopSignals& signals, bool stood_still) noexcept {
+  if (signals.stalled.exchange(false, std::memory_order_relaxed)) return "watchdog";
+  return stood_still ? "stood_still" : nullptr;
 }
 
 /// Sends the outputs of a tick, by arm. If the tick itself was the stall, they are dropped, and the
@@ -136,9 +134,9 @@ inline void send_tick(std::span<const ServoOutput> outputs, const LoopSignals& s
 /// the calling thread until a limit is met or a stop is requested; the motors are off when it
 /// returns. A device that goes away is a fault of its arm alone, and ends the run if no other is
 /// left. `devices` has one for each arm of the servo.
-EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& publisher,
-                    SegmentServer& server, const LoopLimits& limits, LoopSignals& signals,
-                    RunRecord& record) noexcept;
+EndReason run_servo(TickSource& clock, const Devices& devices, AnyServo& servo,
+                    Publisher& publisher, SegmentServer& server, const LoopLimits& limits,
+                    LoopSignals& signals, RunRecord& record) noexcept;
 
 inline constexpr std::chrono::milliseconds kWatchdogPeriod{5};
 

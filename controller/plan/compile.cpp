@@ -97,7 +97,7 @@ class CompiledSceneOf final : public CompiledScene {
   }
 
   [[nodiscard]] std::size_t arms() const noexcept override { return arms_.size(); }
-  using Servo::step;
+  using AnyServo::step;
   void step(std::span<const DeviceReport> reports,
             std::span<ServoOutput> outputs) noexcept override {
     servo_step<N>(arms_, reports, outputs);

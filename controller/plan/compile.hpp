@@ -68,7 +68,7 @@ class ServoSnapshot {
 ///
 /// Each tool has one method in each solid volume (`choose_method`). The costs are known at once;
 /// the memory exists after `take`, and nothing is allocated after that.
-class CompiledScene : public Servo {
+class CompiledScene : public AnyServo {
  public:
   [[nodiscard]] virtual const SceneCosts& costs() const noexcept = 0;
 

@@ -59,7 +59,7 @@ struct Run {
   int rate_hz;
   SegmentWriter& segment;
   SegmentServer& server;
-  Servo& servo;
+  AnyServo& servo;
   Devices devices;
   std::atomic<bool>& stop;
   RunReport& report;
@@ -279,7 +279,8 @@ MaterialScores scores_of(const LoadedScene& scene, const std::vector<double>& re
 }
 
 /// Writes the volumes in their current state.
-void write_final(const ControllerOptions& options, const LoadedScene& scene, const Servo& servo) {
+void write_final(const ControllerOptions& options, const LoadedScene& scene,
+                 const AnyServo& servo) {
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     if (v > 0 && !scene.volumes[v].solid) continue;
     VolumeImage image = scene.volumes[v].image;

@@ -246,8 +246,8 @@ Density border_density(const VolumeImage& image) {
 }
 
 /// The scene as text would have it, with the changes of the command line.
-Scene as_written(const LoadedScene& scene) {
-  Scene written;
+SceneSpec as_written(const LoadedScene& scene) {
+  SceneSpec written;
   static_cast<SceneSettings&>(written) = scene;
   written.volumes = scene.volume_specs;
   written.tools = scene.tool_specs;
@@ -255,7 +255,7 @@ Scene as_written(const LoadedScene& scene) {
 }
 
 /// The input files of a scene.
-std::vector<fs::path> files_read(const ControllerOptions& options, const Scene& scene) {
+std::vector<fs::path> files_read(const ControllerOptions& options, const SceneSpec& scene) {
   const fs::path folder = fs::path(scene.path).parent_path();
   std::vector<fs::path> files{scene.path, scene.hand_script};
   if (scene.second) files.emplace_back(scene.second->hand_script);
@@ -372,7 +372,7 @@ fs::path final_path(const ControllerOptions& options, const LoadedScene& scene, 
 }
 
 void check_report(const ControllerOptions& options) {
-  const Scene scene = parse_scene_file(options.scene, options.overrides.settings);
+  const SceneSpec scene = parse_scene_file(options.scene, options.overrides.settings);
   check_outputs(files_read(options, scene), {{"--report", options.report, ".json"}});
 }
 

@@ -249,7 +249,7 @@ struct LimitPlaces {
 };
 
 /// A scene file after parsing: every value is checked, no other file is read, no array is made.
-struct Scene : SceneSettings {
+struct SceneSpec : SceneSettings {
   std::vector<VolumeSpec> volumes;
   std::vector<ToolSpec> tools;
   bool offset_given = false;     ///< else the device origin is moved to the first surface

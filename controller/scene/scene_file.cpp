@@ -270,7 +270,7 @@ Material& material_named(const SceneTable& table, const std::string& name,
   return material != materials.end() ? *material : materials.emplace_back(known_material(name));
 }
 
-void finish_device(const SceneTable& table, Scene& scene) {
+void finish_device(const SceneTable& table, SceneSpec& scene) {
   scene.offset_given = table.has("offset_mm");
   if (table.has("first_tool")) scene.device.tool_place = table.place("first_tool");
   for (const double sign : scene.device.encoder_sign.value_or(std::array{1.0, 1.0, 1.0})) {
@@ -289,7 +289,7 @@ void finish_device(const SceneTable& table, Scene& scene) {
 
 /// The paper's force has no normal that could cut by force: unless the scene names another model of
 /// cutting, it comes with that of the paper.
-void choose_cut(const SceneTable& table, Scene& scene) {
+void choose_cut(const SceneTable& table, SceneSpec& scene) {
   scene.cut_in_one_tick = table.is_text("rate_per_s");
   if (scene.force.model == ForceModel::paper && !table.has("model")) {
     scene.cut.model = CutModel::overlap;
@@ -297,7 +297,7 @@ void choose_cut(const SceneTable& table, Scene& scene) {
 }
 
 /// The overlap models cut every material, forbidden or not.
-void refuse_uncut(const Scene& scene) {
+void refuse_uncut(const SceneSpec& scene) {
   if (scene.cut.model == CutModel::none || scene.cut.model == CutModel::preston) return;
   for (const Material& material : scene.materials) {
     if (!material.forbidden) continue;
@@ -308,7 +308,7 @@ void refuse_uncut(const Scene& scene) {
 }
 
 /// The paper's force is computed for heads alone.
-void refuse_unfelt(const Scene& scene) {
+void refuse_unfelt(const SceneSpec& scene) {
   if (scene.force.model == ForceModel::proxy) return;
   for (const ToolSpec& tool : scene.tools) {
     if (!tool.shaft.length_mm) continue;
@@ -367,7 +367,7 @@ void add_named(const SceneTable& table, Spec spec, std::vector<Spec>& list,
 }
 
 void read_lists(const SceneTables& tables, SceneParts& parts) {
-  Scene& scene = parts.scene;
+  SceneSpec& scene = parts.scene;
   for (const SceneTable& table : tables.all("volume")) {
     parts.volume = {};
     table.read(parts);
@@ -396,7 +396,7 @@ void read_lists(const SceneTables& tables, SceneParts& parts) {
   }
 }
 
-void refuse_empty(const Scene& scene) {
+void refuse_empty(const SceneSpec& scene) {
   if (scene.volumes.empty()) {
     refuse(scene.path, ": no [[volume]]; write one with file = \"phantom\" or a path");
   }
@@ -497,7 +497,7 @@ SecondArm read_second_arm(const TomlNode& root, const std::filesystem::path& pat
 }
 
 /// A motor's scale of one device is none of another's.
-void refuse_one_scale(const Scene& scene, std::span<const KeyOverride> settings) {
+void refuse_one_scale(const SceneSpec& scene, std::span<const KeyOverride> settings) {
   if (!scene.second || scene.second->device.personality == scene.device.personality) return;
   if (std::ranges::find(settings, "device.torque_scale", &KeyOverride::key) == settings.end())
     return;
@@ -506,7 +506,7 @@ void refuse_one_scale(const Scene& scene, std::span<const KeyOverride> settings)
 }
 
 /// The tool that a device names has to be one of the scene.
-void check_tool_name(const DeviceSettings& device, const Scene& scene) {
+void check_tool_name(const DeviceSettings& device, const SceneSpec& scene) {
   std::vector<std::string_view> names;
   for (const ToolSpec& tool : scene.tools) names.push_back(tool.name);
   if (device.first_tool.empty() || std::ranges::find(names, device.first_tool) != names.end())
@@ -514,12 +514,12 @@ void check_tool_name(const DeviceSettings& device, const Scene& scene) {
   refuse(device.tool_place, unknown_word(device.first_tool, names, "\""));
 }
 
-Scene read_scene(const TomlNode& root, const TomlNode* second, const std::filesystem::path& path,
-                 SceneKeys keys) {
+SceneSpec read_scene(const TomlNode& root, const TomlNode* second,
+                     const std::filesystem::path& path, SceneKeys keys) {
   check_names(root, path.string(), keys);
   const SceneTables tables{root, path.string(), keys};
   SceneParts parts;
-  Scene& scene = parts.scene;
+  SceneSpec& scene = parts.scene;
   scene.path = path.string();
   scene.materials = default_materials();
   read_lists(tables, parts);
@@ -549,7 +549,7 @@ Scene read_scene(const TomlNode& root, const TomlNode* second, const std::filesy
 }
 
 /// `settle_device` of one arm.
-void settle_arm(const Scene& scene, const DeviceSettings& held, LimitSettings& limits) {
+void settle_arm(const SceneSpec& scene, const DeviceSettings& held, LimitSettings& limits) {
   // A motor count of a Cartesian device is 1 mN: a true force that is far from it is a slip.
   constexpr double kLeastShare = 0.1, kMostShare = 10;
   for (const double share : held.torque_scale.value_or(std::array{1.0, 1.0, 1.0})) {
@@ -581,20 +581,20 @@ void settle_arm(const Scene& scene, const DeviceSettings& held, LimitSettings& l
 
 }  // namespace
 
-void settle_device(Scene& scene) {
+void settle_device(SceneSpec& scene) {
   settle_arm(scene, scene.device, scene.limits);
   if (scene.second) settle_arm(scene, scene.second->device, scene.second->limits);
 }
 
-Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys,
-                  std::span<const KeyOverride> settings) {
+SceneSpec parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys,
+                      std::span<const KeyOverride> settings) {
   try {
     TomlNode root = parse_toml(text);
     std::optional<TomlNode> second = take_second_arm(root, path.string());
     override_keys(settings, root);
     if (second) override_keys(settings_of_arm(settings), *second);
     spell_out_burs(root, path.string());
-    Scene scene = read_scene(root, second ? &*second : nullptr, path, keys);
+    SceneSpec scene = read_scene(root, second ? &*second : nullptr, path, keys);
     refuse_one_scale(scene, settings);
     return scene;
   } catch (const TomlError& error) {
@@ -632,7 +632,8 @@ std::string read_scene_text(const std::filesystem::path& path) {
   return text;
 }
 
-Scene parse_scene_file(const std::filesystem::path& path, std::span<const KeyOverride> settings) {
+SceneSpec parse_scene_file(const std::filesystem::path& path,
+                           std::span<const KeyOverride> settings) {
   return parse_scene(read_scene_text(path), path, scene_keys(), settings);
 }
 

@@ -11,7 +11,7 @@
 #include "controller/scene/scene_keys.hpp"
 #include "shared/text/toml.hpp"
 
-// A scene file to a checked `Scene`, and the keys that a command line overrides.
+// A scene file to a checked `SceneSpec`, and the keys that a command line overrides.
 
 namespace kerf {
 
@@ -36,21 +36,21 @@ void override_keys(std::span<const KeyOverride> settings, TomlNode& root);
 /// Reads TOML text. `settings` replace values of it. No file is opened: `path` appears in messages
 /// and in the scene, and the script of the hand is relative to its folder. Throws LoadError, one
 /// line with the line number, for anything that is not a valid scene. Any thread; load time only.
-[[nodiscard]] Scene parse_scene(std::string_view text, const std::filesystem::path& path,
-                                SceneKeys keys = scene_keys(),
-                                std::span<const KeyOverride> settings = {});
+[[nodiscard]] SceneSpec parse_scene(std::string_view text, const std::filesystem::path& path,
+                                    SceneKeys keys = scene_keys(),
+                                    std::span<const KeyOverride> settings = {});
 
 /// The text of a scene file of at most 1 MiB. Throws LoadError.
 [[nodiscard]] std::string read_scene_text(const std::filesystem::path& path);
 
 /// Both in one.
-[[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path,
-                                     std::span<const KeyOverride> settings = {});
+[[nodiscard]] SceneSpec parse_scene_file(const std::filesystem::path& path,
+                                         std::span<const KeyOverride> settings = {});
 
 /// Gives the limits that the scene leaves out the figures of its device
 /// (shared/wire/personality.hpp), and throws LoadError for one, or a torque scale, that the device
 /// does not allow. Again after another device is named.
-void settle_device(Scene& scene);
+void settle_device(SceneSpec& scene);
 
 /// Throws LoadError if the scene names a hand script that is no file. Loading a scene does not
 /// check this, since only an emulated hand needs the script.

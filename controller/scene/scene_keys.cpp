@@ -106,7 +106,7 @@ namespace {
 /// The part of a scene that has the member.
 template <class Part, class T>
 Part& part_with(T Part::*, SceneParts& parts) {
-  Scene& scene = parts.scene;
+  SceneSpec& scene = parts.scene;
   return std::get<Part&>(std::tie(parts.volume, parts.tool, parts.tool.size, parts.tool.shaft,
                                   parts.material, static_cast<SceneSettings&>(scene), scene.device,
                                   scene.force, scene.cut, scene.spindle, scene.limits,

@@ -20,7 +20,7 @@ namespace kerf {
 
 /// The values that the rows point into: a scene, and the current entry of each list of tables.
 struct SceneParts {
-  Scene scene;
+  SceneSpec scene;
   VolumeSpec volume;
   ToolSpec tool;
   Material material;
@@ -108,6 +108,6 @@ struct SceneTableRow {
 
 /// Every setting in effect, one line `table.key=value` each, values as a scene writes them. A key
 /// that the scene would refuse, or that has no value, is left out.
-[[nodiscard]] std::string settings_text(const Scene& scene, SceneKeys keys = scene_keys());
+[[nodiscard]] std::string settings_text(const SceneSpec& scene, SceneKeys keys = scene_keys());
 
 }  // namespace kerf

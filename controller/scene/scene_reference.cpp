@@ -122,7 +122,7 @@ std::string scene_keys_page(SceneKeys keys) {
   return page;
 }
 
-std::string settings_text(const Scene& scene, SceneKeys keys) {
+std::string settings_text(const SceneSpec& scene, SceneKeys keys) {
   SceneParts parts{.scene = scene, .volume = {}, .tool = {}, .material = {}};
   std::string text;
   const auto add_each = [&](std::string_view table, const auto& list, auto& part) {

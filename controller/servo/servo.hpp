@@ -6,107 +6,19 @@
 #include <cstdint>
 #include <span>
 
+#include "include/kerf/tick.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 #include "shared/volume/voxel_grid.hpp"
 #include "shared/wire/personality.hpp"
 
-// The interface of the servo: report and command in, output out.
+// The output of the servo step, and a servo of any number type. Reports and commands are those of
+// other programs too (include/kerf/tick.hpp).
 
 namespace kerf {
 
-/// Report of the device in this tick: raw counts, not angles. The only input of the servo step
-/// besides commands, and so the input of a replay.
-///
-/// A Cartesian device has the position in `encoder`, in counts of its `step_um`
-/// (shared/wire/cartesian.hpp), and the orientation as a quaternion of 16-bit numbers: x, y, z in
-/// `wiper_a`, w in `wiper_b[0]`.
-///
-/// `parked` means that the device is not in use: the stylus is in the inkwell (Omni, Touch), the
-/// centre button of the grip is held (Falcon), the arm has not left the home pose since its
-/// calibration button was pressed (WoodenHaptics), or a button is held (Inverse3, omega). Parking
-/// at rest calibrates the device; motors stay off while it is parked.
-struct DeviceReport {
-  bool fresh = false;                      ///< false: nothing arrived since the last tick
-  std::array<std::int16_t, 3> encoder{};   ///< counts, wrap at 16 bits
-  std::array<std::uint16_t, 3> wiper_a{};  ///< gimbal pots, both wipers; zero without a gimbal
-  std::array<std::uint16_t, 3> wiper_b{};
-  bool button1 = false, button2 = false;  ///< pressed
-  bool parked = false;
-  bool homed = true;          ///< false: absolute encoders have no meaning yet
-  std::uint32_t counter = 0;  ///< packet counter of the device, else of the driver
-};
-
-/// A command of a person or a program; applied at a tick boundary. Values of kinds go into logs:
-/// append only.
-struct ServoCommand {
-  enum class Kind : std::uint32_t {
-    none,
-    select_tool,
-    hold,
-    fade_in,  ///< force starts again from 0: after a stall of the servo
-    reset,    ///< restores the volumes' first content, over several ticks; no-op without cutting
-    undo,     ///< restores the content before the last stroke, likewise; refused without one
-    redo,     ///< repeats the stroke that was undone last, likewise
-    mark,     ///< changes nothing: marks a tick in the log
-    missed    ///< ticks that the host skipped before this one: without a report, for all arms
-  };
-  Kind kind = Kind::none;
-  std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off; missed: ticks
-  std::uint32_t arm = 0;       ///< that gets the tool; other kinds are for all arms
-};
-
 inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
-
-/// Phase of the safety state machine. Motors are on in `ramping` and `active` only. Values go
-/// into logs: append only.
-enum class Phase : std::uint8_t {
-  off,          ///< no report has come yet
-  calibrating,  ///< never parked at rest yet, or homing lost: the joint angles are unknown
-  armed,        ///< calibrated and parked: waits for the hand
-  ramping,      ///< taken in hand: force fades in
-  active,
-  fault  ///< latched; parking at rest clears it
-};
-
-/// Why the force went to zero. Values go into logs: append only.
-enum class Fault : std::uint32_t {
-  none = 0,
-  stale_input = 1,  ///< no report for 20 ms
-  not_finite = 2,   ///< no finite pose, or counts of none, for more than 2 ms
-  overspeed = 3,    ///< tip faster than the limit
-  // A law of the scene gave a value that is not finite:
-  force_law = 4,
-  velocity_estimator = 5,
-  stabiliser = 6,
-  wrong_dock = 7,   ///< parked at rest, but not where it was calibrated first
-  sparse_input = 8  ///< reports came too seldom for too long
-};
-
-[[nodiscard]] constexpr const char* fault_name(Fault fault) noexcept {
-  switch (fault) {
-    case Fault::none:
-      return "none";
-    case Fault::stale_input:
-      return "stale_input";
-    case Fault::not_finite:
-      return "not_finite";
-    case Fault::overspeed:
-      return "overspeed";
-    case Fault::force_law:
-      return "force_law";
-    case Fault::velocity_estimator:
-      return "velocity_estimator";
-    case Fault::stabiliser:
-      return "stabiliser";
-    case Fault::wrong_dock:
-      return "wrong_dock";
-    case Fault::sparse_input:
-      return "sparse_input";
-  }
-  return "unknown";
-}
 
 /// A plane that the tool presses on, with its load; at the device port.
 template <class N>
@@ -176,9 +88,9 @@ struct ServoOutput {
 ///
 /// `compile` makes one. `step`, `apply` and `penetration_mm` belong to the servo thread and are the
 /// functions of servo_step.hpp; the rest is constant, or may be read while no step runs.
-class Servo {
+class AnyServo {
  public:
-  virtual ~Servo() = default;
+  virtual ~AnyServo() = default;
 
   /// 1 or 2; constant.
   [[nodiscard]] virtual std::size_t arms() const noexcept = 0;

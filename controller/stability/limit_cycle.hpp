@@ -8,42 +8,9 @@
 #include <cstdint>
 #include <limits>
 
+#include "include/kerf/stability.hpp"
+
 namespace kerf {
-
-/// The verdict on a run. A run with none of the four flags is proven to be at rest.
-struct LimitCycle {
-  /// In both halves of the last half of the run the tip reverses at least twice, each time after
-  /// more than one encoder step, and its travel does not fall. Or the run cannot go on.
-  bool swings = false;
-  /// In both halves of the last half the motors give more energy than a push over one encoder step
-  /// takes, and neither this nor the travel falls.
-  bool active = false;
-  /// Neither: but travel or energy of the last half is above one encoder step.
-  bool undecided = false;
-  /// None of them: but rounding of fixed numbers keeps up a motion that rests in double
-  /// (`MapSpec`).
-  bool arithmetic = false;
-  double travel_mm = 0;  ///< in the last half; 0: held by friction
-  double given_mj = 0;   ///< by the motors to tip and hand: rise of the maximum in the last half
-  double port_minimum_mj = 0;  ///< lowest energy of the device port in a run that begins at 0
-
-  /// Proven.
-  [[nodiscard]] bool rests() const noexcept {
-    return !(swings || active || undecided || arithmetic);
-  }
-  /// The worst that a run can show: no further run changes it.
-  [[nodiscard]] bool worst() const noexcept { return swings && active; }
-  /// The worse of two runs.
-  void join(const LimitCycle& other) noexcept {
-    swings = swings || other.swings;
-    active = active || other.active;
-    undecided = undecided || other.undecided;
-    arithmetic = arithmetic || other.arithmetic;
-    travel_mm = std::max(travel_mm, other.travel_mm);
-    given_mj = std::max(given_mj, other.given_mj);
-    port_minimum_mj = std::min(port_minimum_mj, other.port_minimum_mj);
-  }
-};
 
 /// Follows one run until its verdict is final. Rest is only reported if it is proven:
 ///

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A coupling that hardens: F = K d + H d^3 along a spring of length d, with kerf's damper.
-#include "controller/law/law.hpp"
-#include "controller/law/virtual_coupling.hpp"
+#include <kerf/law.hpp>
 
 template <class N>
 class HardeningSpring {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "controller/law/registry/law_registry.hpp"
+#include <kerf/law.hpp>
 
 template <class N>
 int failures() {

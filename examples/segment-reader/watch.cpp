@@ -6,24 +6,21 @@
 #include <exception>
 #include <thread>
 
-#include "shared/segment/connection.hpp"
+#include <kerf/segment.hpp>
 
-int main(int argc, char** argv) {
-  try {
-    const auto connection = kerf::connect_segment(argc > 1 ? argv[1] : "kerf");
-    kerf::VolumeSnapshot volume;  // the densities of the first one: what has changed is copied
-    while (connection.alive()) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-      connection.reader().update(0, volume);
-      const auto last = connection.reader().latest();
-      if (!last) continue;
-      const auto& [x, y, z] = last->position_mm;
-      const auto& [fx, fy, fz] = last->commanded_force_n;
-      std::printf("tick %ju: tip %.2f %.2f %.2f mm, force %.2f N, %zu bricks new\n",
-                  std::uintmax_t{last->tick}, x, y, z, std::hypot(fx, fy, fz),
-                  volume.changed.size());
-    }
-  } catch (const std::exception& error) {
-    return std::fprintf(stderr, "watch: %s\n", error.what()), 2;
+int main(int argc, char** argv) try {
+  auto running = kerf::Segment::open(argc > 1 ? argv[1] : "kerf");
+  while (running.alive()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::size_t bricks = 0;
+    running.volume(0, &bricks);  // the densities of the first one: what has changed is copied
+    const auto last = running.latest();
+    if (!last) continue;
+    const auto& [x, y, z] = last->position_mm;
+    const auto& [fx, fy, fz] = last->commanded_force_n;
+    std::printf("tick %ju: tip %.2f %.2f %.2f mm, force %.2f N, %zu bricks new\n",
+                std::uintmax_t{last->tick}, x, y, z, std::hypot(fx, fy, fz), bricks);
   }
+} catch (const std::exception& error) {
+  return std::fprintf(stderr, "watch: %s\n", error.what()), 2;
 }

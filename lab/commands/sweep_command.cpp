@@ -97,7 +97,7 @@ struct SweepRequest {
 
 /// The scene of the first run that is one; where none is, the sweep is nothing to begin with. Looks
 /// at no more than the first thousand.
-Scene first_scene(const SweepRequest& request) {
+SceneSpec first_scene(const SweepRequest& request) {
   std::exception_ptr first_refusal;
   constexpr std::size_t kLooks = 1000;
   for (std::size_t run = 0; run < std::min(grid::cells_of(request.axes), kLooks); ++run) {
@@ -213,7 +213,7 @@ int Command::run(std::ostream& out) const {
                              : device_.empty() ? "omni"
                                                : device_,
                              seconds_, axes};
-  const Scene scene = first_scene(request);
+  const SceneSpec scene = first_scene(request);
   for (const char* name : {"controller", "emulator"}) {
     if (access(program_beside(name).c_str(), X_OK) != 0) {
       throw HilError(program_beside(name) + ": is not there; build it, or install all of kerf");

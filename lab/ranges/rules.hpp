@@ -62,7 +62,7 @@ class Rules {
 };
 
 /// Sum of all densities of the scene.
-[[nodiscard]] inline std::uint64_t sum_of(const Servo& servo, std::size_t volumes) {
+[[nodiscard]] inline std::uint64_t sum_of(const AnyServo& servo, std::size_t volumes) {
   std::uint64_t sum = 0;
   for (std::size_t v = 0; v < volumes; ++v) {
     const auto density = servo.density(v);
@@ -72,7 +72,7 @@ class Rules {
 }
 
 /// Hash of the last output and the state after it; the output hash is a chain over all ticks.
-[[nodiscard]] inline std::uint64_t hash_of(const Servo& servo, std::size_t volumes,
+[[nodiscard]] inline std::uint64_t hash_of(const AnyServo& servo, std::size_t volumes,
                                            const ServoOutput& last) {
   std::uint64_t hash = fnv1a_step(last.output_hash, std::bit_cast<std::uint64_t>(last.absorbed_mj));
   for (const double mm : last.position_mm)

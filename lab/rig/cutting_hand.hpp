@@ -73,14 +73,14 @@ class CuttingHand {
     return out;
   }
 
-  [[nodiscard]] Servo& servo() { return *servo_; }
+  [[nodiscard]] AnyServo& servo() { return *servo_; }
   [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
   [[nodiscard]] double fed_mm3() const { return fed_mm3_; }
 
  private:
   double tick_s_, threshold_n_, machinability_;
   std::vector<double> mm3_per_step_;
-  std::unique_ptr<Servo> servo_;
+  std::unique_ptr<AnyServo> servo_;
   KinematicOmni arm_;
   Point at_mm_{};
   double removed_mm3_ = 0, fed_mm3_ = 0;

@@ -69,7 +69,7 @@ class KinematicOmni {
 inline constexpr int kDockTicks = 60;  ///< enough rest in the inkwell to be calibrated at 1 kHz
 
 /// Docks, leaves the inkwell, waits there until the force is faded in.
-inline void arm_at(Servo& servo, KinematicOmni& arm, double x_mm, double y_mm, double z_mm,
+inline void arm_at(AnyServo& servo, KinematicOmni& arm, double x_mm, double y_mm, double z_mm,
                    int ticks = 1) {
   for (int tick = 0; tick < kDockTicks * ticks; ++tick) static_cast<void>(servo.step(arm.docked()));
   // The move from the inkwell is slow enough for the speed limit: held far away, then close.

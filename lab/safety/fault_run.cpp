@@ -147,8 +147,9 @@ class GuardedLoop {
       return;
     }
     const DeviceReport report = loop_.driver().read();
-    apply_missed(std::exchange(missed_, 0), loop_.servo());
-    static_cast<void>(recover(signals_, standstill_.stood_still(now_ns), loop_.servo()));
+    const bool stalled = stall_before(signals_, standstill_.stood_still(now_ns)) != nullptr;
+    static_cast<void>(
+        apply_commands({.fade_in = stalled, .missed = std::exchange(missed_, 0)}, loop_.servo()));
     const ServoOutput output = loop_.servo().step(report);
     send_tick(std::span(&output, 1), signals_, loop_.driver());
     ++signals_.heartbeat;

@@ -89,7 +89,7 @@ class Rider {
   }
 
  private:
-  std::unique_ptr<Servo> servo_;
+  std::unique_ptr<AnyServo> servo_;
   KinematicOmni arm_;
   Place at_mm_{};
 };

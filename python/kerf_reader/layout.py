@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shared segment byte by byte, as shared/segment/layout.hpp has it; a log has the same rows.
+"""The shared segment byte by byte, as shared/segment/layout.hpp and include/kerf/tick.hpp have it; a log has the same rows.
 
 Its test compares all with a log and with a running controller of the same build: ABI is the hash of the layout,
 and a segment with another one is refused."""

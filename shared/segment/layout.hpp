@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 
+#include "include/kerf/tick.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/volume/checksum.hpp"
 #include "shared/wire/personality.hpp"
@@ -32,8 +33,6 @@ namespace kerf {
 static_assert(std::endian::native == std::endian::little,
               "the segment and the log are little-endian and written as they lie in memory; a "
               "big-endian machine runs the servo core only (KERF_CORE_ONLY)");
-
-using Tick = std::uint64_t;  ///< count of servo steps; 0 is the state before the first one
 
 inline constexpr std::uint64_t kSegmentMagic = [] {
   std::uint64_t magic = 0;
@@ -121,65 +120,6 @@ struct VolumeDescriptor {
   std::uint64_t off_labels;  ///< u8 per voxel, x fastest, constant; 0 if there are no labels
 };
 
-/// Input, contact and output of one arm in one servo tick. World mm for the tip; forces in N at the
-/// device port. `log_columns.cpp` has each field's unit, meaning and validity (docs/log.md).
-struct TickRecord {
-  std::uint64_t seq;  ///< of record i: 2 i + 1 while it is written, then 2 i + 2; set by the writer
-  std::uint64_t tick;
-  std::uint64_t start_ns;  ///< of the tick, CLOCK_MONOTONIC; in lock-step tick * tick_ns
-  std::int32_t period_error_ns;
-  std::uint32_t execution_ns;
-  std::uint32_t flags;  ///< kFlag... below
-  std::uint32_t missed_deadlines;
-  std::int32_t encoder_counts[6];  ///< 0..2: joints, unwrapped since docking; 3..5: gimbal, mrad
-  double position_mm[3];           ///< NaN in the phases off and calibrating
-  float orientation[4];            ///< quaternion x, y, z, w: tool to world; NaN likewise
-  float velocity_mm_per_s[3];      ///< NaN likewise, and until the user first takes the tool
-  float commanded_force_n[3];
-  float contact_force_n[3];
-  float modification_force_n[3];
-  float proxy_offset_mm[3];
-  std::int16_t dac_counts[3];
-  std::uint16_t phase;    ///< `Phase` of the servo
-  std::uint32_t removed;  ///< density units removed in this tick; in an undo, restored
-  double port_energy_j;   ///< energy that the loop took from the hand since the start of the run
-  double port_minimum_j;  ///< its lowest value so far; below 0 the loop gave more than it took
-  float joint_torque_n_mm[3];
-  std::uint32_t refused_packets;  ///< since the start: none, old, or repeated under force
-  std::uint64_t volume_hash;      ///< chained over all changed boxes since the start
-  std::uint64_t output_hash;      ///< chained over all outputs since the start
-  std::uint16_t dirty_lo[3];      ///< first voxel of the changed box of the first changed volume
-  std::uint16_t dirty_hi[3];      ///< its end, exclusive
-  std::uint32_t lost_packets;     ///< since the start
-  std::uint32_t dirty_volumes;    ///< bit v: volume v changed in this tick
-  std::uint32_t last_command;     ///< `Command::index` of the newest that the servo took; 0: none
-  float tip_torque_n_mm[3];
-  float spindle_ratio;
-  std::int32_t raw[11];  ///< as received from the device; kRaw... below
-  float press_n;         ///< normal force that cuts, in the scene
-  // One field for each `EnergySource`, in steps of 2^-32 mJ. Their sum is `port_energy_j`.
-  std::int64_t energy_spring;
-  std::int64_t energy_damping;
-  std::int64_t energy_friction;
-  std::int64_t energy_cutting;
-  std::int64_t energy_limits;
-  std::int64_t energy_hold;
-  std::int64_t energy_leak;
-  std::int64_t energy_stabiliser;
-  float spindle_load;
-  std::uint32_t active_tool;
-  std::uint32_t fault;
-  std::uint32_t stale;
-  float penetration_mm;
-  std::uint32_t plane_count;       ///< contact planes that hold the tool, at most 3
-  float plane_load_n[3];           ///< along each normal, before any limit, at the device port
-  float plane_normal[9];           ///< x, y, z of each, out of the solid
-  float plane_arm_mm[9];           ///< x, y, z of each: from the tool's centre to the contact
-  std::uint32_t command;           ///< applied before this tick's step; kCommand... below
-  std::uint32_t command_argument;  ///< of that command: index of the tool; hold: 1 on, 0 off
-  std::uint32_t crc32c;            ///< of all bytes from `tick` up to here; set by the writer
-};
-
 /// The index of a published record in its ring. With two arms, index i of both rings is the
 /// same tick.
 [[nodiscard]] inline std::uint64_t record_index(const TickRecord& record) noexcept {
@@ -192,39 +132,6 @@ struct TickRecord {
   return crc32c(
       std::as_bytes(std::span(&record, 1)).subspan(kFirst, offsetof(TickRecord, crc32c) - kFirst));
 }
-
-inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
-inline constexpr std::uint32_t kFlagButton2 = 1U << 1;
-inline constexpr std::uint32_t kFlagContact = 1U << 2;      ///< commanded force above 0.01 N
-inline constexpr std::uint32_t kFlagClamped = 1U << 4;      ///< a limit of the force acted
-inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;   ///< no fresh report in this tick
-inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;  ///< a fault of any kind is latched
-inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;
-inline constexpr std::uint32_t kFlagParked = 1U << 8;      ///< as the device reports
-inline constexpr std::uint32_t kFlagStarted = 1U << 9;     ///< taken in hand at least once
-inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< presses on a forbidden material
-inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< no free position near the hand
-inline constexpr std::uint32_t kFlagShaft = 1U << 12;  ///< shaft or handpiece presses on the solid
-inline constexpr std::uint32_t kFlagReset = 1U << 13;  ///< a reset of the volumes is in progress
-inline constexpr std::uint32_t kFlagUndo = 1U << 14;   ///< an undo is in progress
-inline constexpr std::uint32_t kFlagUndoable = 1U << 15;  ///< an undo is possible
-inline constexpr std::uint32_t kFlagRedo = 1U << 16;      ///< a redo is in progress
-inline constexpr std::uint32_t kFlagRedoable = 1U << 17;  ///< a redo is possible
-inline constexpr std::uint32_t kFlagPedal = 1U << 18;     ///< cuts only while button 1 is pressed
-
-/// Bits of `TickRecord::command`: a `ServoCommand::Kind` (not a `CommandKind`), one bit that is
-/// set if the force fades in again after a stall of the servo, and above kCommandMissedShift how
-/// many ticks the servo missed before this one.
-inline constexpr std::uint32_t kCommandKind = 0xff;
-inline constexpr std::uint32_t kCommandFadeIn = 1U << 8;
-inline constexpr unsigned kCommandMissedShift = 16;
-inline constexpr std::uint32_t kMostMissed = 0xffff;  ///< more count as these: 8 s at 8 kHz
-inline constexpr std::uint32_t kCommandMark = 7;      ///< a kind; only marks the tick in the log
-
-inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
-inline constexpr std::size_t kRawPot = 3;      ///< first of 6
-inline constexpr std::size_t kRawStatus = 9;   ///< bits: button 1, button 2, parked, not homed
-inline constexpr std::size_t kRawDeviceCounter = 10;
 
 /// Why a box of voxels changed.
 enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2, undo = 3, redo = 4 };

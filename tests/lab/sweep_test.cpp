@@ -192,7 +192,8 @@ TEST_CASE("the numbers of a law are axes below its key, whichever law it is") {
   const auto tau_ms = [&](const std::vector<std::string>& texts) {
     std::vector<kerf::KeyOverride> settings;
     for (const std::string& text : texts) settings.push_back(kerf::parse_setting(text));
-    const kerf::Scene read = kerf::parse_scene(scene, "scene.toml", kerf::scene_keys(), settings);
+    const kerf::SceneSpec read =
+        kerf::parse_scene(scene, "scene.toml", kerf::scene_keys(), settings);
     return read.servo.velocity.settings.at(0).second;
   };
   CHECK(tau_ms({"servo.velocity=difference", "servo.velocity.tau_ms=3"}) == 3);

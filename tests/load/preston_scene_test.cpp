@@ -30,7 +30,7 @@ const std::string kSmallest =
     "size_vox = 16\n";
 const std::string kOverlap = "[cut]\nmodel = \"overlap\"\n";
 
-Scene parse(const std::string& lines) {
+SceneSpec parse(const std::string& lines) {
   return parse_scene(kSmallest + lines, "x.toml");
 }
 
@@ -62,14 +62,14 @@ double steps_per_n(const PrestonPlan<DoubleNumbers>& plan, std::size_t material)
 }  // namespace
 
 TEST_CASE("the keys of cutting by force reach their places, and have defaults") {
-  const Scene plain = parse("");
+  const SceneSpec plain = parse("");
   CHECK(plain.force.model == ForceModel::proxy);
   CHECK(plain.cut.model == CutModel::preston);
   CHECK(plain.cut.machinability_mm3_per_s_n == 0.083);
   CHECK(plain.cut.threshold_n == 0.05);
   CHECK(plain.cut.friction == 0.5);
   CHECK(plain.spindle.speed_krpm == 300);
-  const Scene scene = parse(
+  const SceneSpec scene = parse(
       "[cut]\nmachinability_mm3_per_s_n = 0.1\nthreshold_n = 0.2\n"
       "friction = 0.4\n[spindle]\nspeed_krpm = 150\n"
       "stall_torque_n_mm = 2\ninertia_g_mm2 = 3\n"

@@ -32,7 +32,7 @@ const std::string kSmallest =
     "shape = \"ball\"\n"
     "size_vox = 16\n";
 
-Scene parse(const std::string& text) {
+SceneSpec parse(const std::string& text) {
   return parse_scene(text, "scenes/x.toml");
 }
 
@@ -73,7 +73,7 @@ void check_lines(const std::vector<Line>& lines) {
 }  // namespace
 
 TEST_CASE("the smallest scene takes every default") {
-  const Scene scene = parse(kSmallest);
+  const SceneSpec scene = parse(kSmallest);
   REQUIRE(scene.volumes.size() == 1);
   CHECK(scene.volumes[0].name == "phantom");
   CHECK(scene.volumes[0].shape == kMolar);
@@ -103,7 +103,7 @@ TEST_CASE("the smallest scene takes every default") {
 }
 
 TEST_CASE("every key reaches its place") {
-  const Scene scene = parse(R"(
+  const SceneSpec scene = parse(R"(
     scene.title = "a jaw"
     [[volume]]
     file = "ct/a.nrrd"
@@ -269,7 +269,7 @@ TEST_CASE("a value out of range is reported with its line and the range") {
       {after("[device]\ntorque_scale = [0.3, 0.3, 0]\n"),
        "7: device.torque_scale = [0.3, 0.3, 0] is below 0.001"},
   });
-  const Scene zero = parse(kSmallest + "[force]\ndamping_ns_per_mm = -0.0\n");
+  const SceneSpec zero = parse(kSmallest + "[force]\ndamping_ns_per_mm = -0.0\n");
   CHECK_FALSE(std::signbit(zero.force.damping_ns_per_mm));  // -0 is a zero
 }
 
@@ -394,8 +394,10 @@ TEST_CASE("a scene file that is not there, no file or a huge one is refused") {
 TEST_CASE("a hand script that is not there is refused where one asks") {
   const TemporaryFolder folder;
   const auto file = folder.write("x.toml", kSmallest + "[hand]\nscript = \"hand.toml\"\n");
-  const Scene scene = parse_scene_file(file);
-  const auto error = [](const Scene& of) { return test::error_of([&] { check_hand_script(of); }); };
+  const SceneSpec scene = parse_scene_file(file);
+  const auto error = [](const SceneSpec& of) {
+    return test::error_of([&] { check_hand_script(of); });
+  };
   CHECK(error(scene) ==
         file.string() +
             ":7: hand.script = \"hand.toml\" is no file in the scene's folder; copy "

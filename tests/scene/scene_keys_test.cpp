@@ -468,7 +468,7 @@ TEST_CASE("a new row alone brings a key: it is read, checked, told, printed and 
   CHECK(
       error_of(lines.text(keys)).find(": limits.grip_n is not a known key; known here: force_n") !=
       std::string::npos);
-  const Scene scene = parse_scene(lines.text(keys), "x.toml", keys);
+  const SceneSpec scene = parse_scene(lines.text(keys), "x.toml", keys);
   CHECK(grip_n == 2.5);
   CHECK(has(settings_text(scene, keys), "\nlimits.grip_n=2.5\n"));
   LoadedScene loaded;

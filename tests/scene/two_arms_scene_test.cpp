@@ -40,7 +40,7 @@ const std::string kTwo = kTools +
                          "torque_scale = [1, 1, 1]\n"
                          "offset_mm = [1, 2, 3]\n";
 
-Scene parse(const std::string& text, const std::vector<std::string>& settings = {}) {
+SceneSpec parse(const std::string& text, const std::vector<std::string>& settings = {}) {
   std::vector<KeyOverride> overrides;
   for (const std::string& setting : settings) overrides.push_back(parse_setting(setting));
   return parse_scene(text, "scenes/x.toml", scene_keys(), overrides);
@@ -57,13 +57,13 @@ LoadedScene load(const std::string& text, const SceneOverrides& overrides = {}) 
 }  // namespace
 
 TEST_CASE("[[device]] once is [device], and twice is two arms") {
-  const Scene one =
+  const SceneSpec one =
       parse(kTools + "[[device]]\npersonality = \"touch\"\n[[hand]]\nscript = \"a\"\n");
   CHECK(one.device.personality == Personality::touch);
   CHECK(one.hand_script == "scenes/a");
   CHECK_FALSE(one.second);
 
-  const Scene two = parse(kTwo + "[[hand]]\nscript = \"a\"\n[[hand]]\nscript = \"b\"\n");
+  const SceneSpec two = parse(kTwo + "[[hand]]\nscript = \"a\"\n[[hand]]\nscript = \"b\"\n");
   CHECK(two.device.personality == Personality::omni);
   CHECK_FALSE(two.device.torque_scale);
   REQUIRE(two.second);
@@ -76,10 +76,10 @@ TEST_CASE("[[device]] once is [device], and twice is two arms") {
 }
 
 TEST_CASE("the limits of each arm are those of its own device") {
-  const Scene own = parse(kTwo);
+  const SceneSpec own = parse(kTwo);
   CHECK(own.limits.force_n == 3.3);
   CHECK(own.second->limits.force_n == 12);
-  const Scene given = parse(kTwo + "[limits]\nforce_n = 2\ncontinuous_force_n = 0.5\n");
+  const SceneSpec given = parse(kTwo + "[limits]\nforce_n = 2\ncontinuous_force_n = 0.5\n");
   CHECK(given.limits.force_n == 2);
   CHECK(given.second->limits.force_n == 2);
   CHECK(given.second->limits.slew_n_per_ms == 1.8);
@@ -121,7 +121,7 @@ TEST_CASE("what two arms cannot be is one line with its place") {
 }
 
 TEST_CASE("a setting of a command line is for both devices, but the scale, which they share") {
-  const Scene scene = parse(kTwo, {"device.personality=touch", "device.workspace_scale=3"});
+  const SceneSpec scene = parse(kTwo, {"device.personality=touch", "device.workspace_scale=3"});
   CHECK(scene.device.personality == Personality::touch);
   CHECK(scene.second->device.personality == Personality::touch);
   CHECK(scene.device.workspace_scale == 3);

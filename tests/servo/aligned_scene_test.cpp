@@ -54,7 +54,7 @@ class Pair {
   ServoOutput fixed, exact;
 
  private:
-  std::unique_ptr<Servo> fixed_, exact_;
+  std::unique_ptr<AnyServo> fixed_, exact_;
   KinematicOmni fixed_arm_, exact_arm_;
 };
 

@@ -50,7 +50,7 @@ struct Arm {
   }
 
   LoadedScene scene;
-  std::unique_ptr<Servo> servo;
+  std::unique_ptr<AnyServo> servo;
   std::optional<KinematicHand> hand;
 };
 

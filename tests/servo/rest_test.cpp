@@ -35,7 +35,7 @@ struct RestingServo {
   int rate_hz;
   int ticks = 0, said = 0;
   KinematicOmni arm;
-  std::unique_ptr<Servo> servo;
+  std::unique_ptr<AnyServo> servo;
 };
 
 /// From the first report, which only tells where the arm is, to the end of the rest.

@@ -104,7 +104,7 @@ struct ArmedServo {
     return out;
   }
 
-  std::unique_ptr<Servo> servo;
+  std::unique_ptr<AnyServo> servo;
   KinematicOmni arm;
 };
 

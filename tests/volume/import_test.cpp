@@ -61,7 +61,7 @@ TEST_CASE("import writes a volume, a scene that reads it and a preview, and tell
   CHECK(v.origin_mm == std::array<double, 3>{1, 1, 0});  // voxel (2, 2, 0) of the source
   CHECK(v.min == 0);
   CHECK(v.max == kDensityMax);
-  const Scene scene = parse_scene_file(folder / "out.toml");
+  const SceneSpec scene = parse_scene_file(folder / "out.toml");
   REQUIRE(scene.volumes.size() == 1);
   CHECK(scene.volumes[0].file == "out.nrrd");
   CHECK(*scene.volumes[0].iso == doctest::Approx(0.5).epsilon(0.01));
@@ -271,7 +271,7 @@ TEST_CASE("a volume with labels keeps them and gets no proposal") {
   image.labels.front() = 6;  // a material that nobody knows
   write_volume(image, tooth);
   REQUIRE(run({"import", tooth, "--out", out, "--force", "--no-crop"}).code == 0);
-  const Scene scene = parse_scene_file(folder / "out.toml");
+  const SceneSpec scene = parse_scene_file(folder / "out.toml");
   REQUIRE(scene.materials.size() == 7);
   CHECK(scene.materials[6].name == "label 6");
 
@@ -336,7 +336,7 @@ TEST_CASE("a map of labels alone becomes a material each, a scan of the same ste
   REQUIRE(made.code == 0);
   CHECK(has(made.out, "a map of labels; --iso 0.5 makes one body of them"));
   CHECK(text_of(folder / "out.png").starts_with("\x89PNG\r\n"));
-  const Scene scene = parse_scene_file(folder / "out.toml");
+  const SceneSpec scene = parse_scene_file(folder / "out.toml");
   REQUIRE(scene.materials.size() == 6);
   CHECK(scene.materials[4].colour != scene.materials[5].colour);
   VolumeImage image = apply_window(read_volume(out), {0, kDensityMax});

@@ -67,11 +67,12 @@ def choices(file, name):
 
 def segment(root, programs):
     file, fields = Source(root, "shared/segment/layout.hpp"), Source(root, "shared/segment/layout_table.hpp")
+    homes = {"TickRecord": Source(root, "include/kerf/tick.hpp")}
     stated = {}
     for record, name, at, kind, count in re.findall(r'KERF_FIELD\((\w+), (\w+), (\w+), "(\w+)", (\d+)\)', fields.text):
         stated.setdefault(record, []).append((int(at, 0), name, kind, int(count)))
     told = {"TickRecord": log_columns(root)}
-    parts = [f"## `{name}`\n\n{what}{struct_table(file, name, stated[name], told.get(name))}\n" for name, what in (
+    parts = [f"## `{name}`\n\n{what}{struct_table(homes.get(name, file), name, stated[name], told.get(name))}\n" for name, what in (
         ("SegmentHeader", "At byte 0, one page. Each word that changes has a line of 64 bytes of its own; `lifecycle` shares that of "
                           "`heartbeat_ns`. "),
         ("VolumeDescriptor", "At `off_volume_table`, one for each volume. `origin_mm` is the place of the centre of voxel "

@@ -39,7 +39,7 @@ struct ReadyServo {
     servo = compile(scene);
   }
   LoadedScene scene;
-  std::unique_ptr<Servo> servo;
+  std::unique_ptr<AnyServo> servo;
 };
 
 /// Packets that have left by the port's thread.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Further laws for the test own_law, one of each kind, for a what-if with another one.
-#include "controller/law/law.hpp"
+#include <kerf/law.hpp>
 
 template <class N>
 class HalfSpring {

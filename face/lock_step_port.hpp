@@ -11,15 +11,20 @@
 
 #include "controller/device/port/packet_port.hpp"
 #include "hil/device/packet_device.hpp"
+#include "shared/wire/personality.hpp"
 
-namespace kerf::web {
+namespace kerf {
 
 /// Controller and emulated device in one thread, in lock-step: each packet that the driver sends
 /// takes the device one tick further, as `serve_lockstep` does over a socket.
-class TabPort final : public PacketPort {
+class LockStepPort final : public PacketPort {
  public:
-  /// `device` outlives it. `device_first`: its packet comes before any of the host.
-  TabPort(PacketDevice& device, int tick_cycles, bool device_first)
+  /// `device` outlives it.
+  LockStepPort(PacketDevice& device, Personality personality, int rate_hz)
+      : LockStepPort(device, kCyclesPerSecond / rate_hz,
+                     personality == Personality::omni || is_cartesian(personality)) {}
+  /// `device_first`: its packet comes before any of the host.
+  LockStepPort(PacketDevice& device, int tick_cycles, bool device_first)
       : device_(device), tick_cycles_(tick_cycles) {
     if (device_first) collect();
   }
@@ -54,4 +59,4 @@ class TabPort final : public PacketPort {
   std::deque<std::vector<std::uint8_t>> waiting_;
 };
 
-}  // namespace kerf::web
+}  // namespace kerf

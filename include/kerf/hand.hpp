@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+
+#include "kerf/scene.hpp"
+#include "kerf/tick.hpp"
+
+namespace kerf {
+
+/// The scene's device, emulated down to its packets, and the hand that holds it, in lock-step with
+/// a servo: the run of `./kerf demo --virtual` to the bit.
+///
+///     kerf::Hand hand(scene, "press.toml");
+///     servo.step(hand.next(servo.last()));
+///
+/// The hand rests until the device is calibrated, reaches for the start of its script, goes through
+/// it and stays at its end (docs/script-keys.md). One thread.
+class Hand {
+ public:
+  /// `script`: TOML of a hand; empty: it only reaches for its start, and is led from there.
+  /// `faults`: TOML of faults of the device (hil/faults); empty: none. `arm`: whose device it is.
+  /// Throws Error.
+  explicit Hand(const Scene& scene, const std::filesystem::path& script = {},
+                const std::filesystem::path& faults = {}, std::size_t arm = 0);
+  ~Hand();
+  Hand(Hand&&) noexcept;
+  Hand& operator=(Hand&&) noexcept;
+
+  /// The device gets the motor counts of the last tick, which take it a period further, and its
+  /// newest report comes. `last` is that of its own arm; before the first tick nothing is sent.
+  [[nodiscard]] DeviceReport next(const TickRecord& last) noexcept;
+
+  /// Leads a hand whose script has ended: where its tip shall be, in scene mm, as far as a hand can
+  /// follow. It lets go after a quarter of a second without a new target.
+  void lead(const std::array<double, 3>& tip_mm, bool button = false) noexcept;
+
+  /// True if it can be led: the script has ended.
+  [[nodiscard]] bool ended() const noexcept;
+  /// The true tip in scene mm, which no encoder knows to the last digit.
+  [[nodiscard]] std::array<double, 3> tip_mm() const noexcept;
+  /// The true force of the motors at the tip, N along the axes of the device.
+  [[nodiscard]] std::array<double, 3> motor_force_n() const noexcept;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+
+#include "kerf/scene.hpp"
+#include "kerf/tick.hpp"
+
+namespace kerf {
+
+/// A volume as it is now; x fastest. Lives as long as its servo, and changes with its next step.
+struct VoxelView {
+  std::array<int, 3> size{};
+  std::array<double, 3> spacing_mm{};
+  std::span<const std::uint16_t> density{};  ///< 0 is air, 65535 is full
+};
+
+/// The servo of a scene without a device, a clock or a thread: reports and commands in, ticks out.
+/// A pure function of the scene and of what it is given: the same bits on every machine, in fixed
+/// point also with every instruction set.
+///
+///     kerf::Servo servo(scene);
+///     kerf::Hand hand(scene, "press.toml");
+///     for (int i = 0; i < 4000; ++i) servo.step(hand.next(servo.last()));
+///     std::printf("%g N\n", servo.last().commanded_force_n[1]);
+///
+/// A step takes some microseconds (`Scene::explain`), allocates nothing, throws nothing, locks
+/// nothing and has a bound from load. One thread.
+class Servo {
+ public:
+  /// Plans the scene, and copies its volumes. Throws Error for a scene that the loop cannot hold.
+  explicit Servo(const Scene& scene);
+  ~Servo();
+  Servo(Servo&&) noexcept;
+  Servo& operator=(Servo&&) noexcept;
+
+  /// 1 or 2.
+  [[nodiscard]] std::size_t arms() const noexcept;
+
+  /// One tick of a scene with one arm. Of a scene with two the second one has no report then.
+  const TickRecord& step(const DeviceReport& report) noexcept;
+  /// One tick of all arms; a report that is missing counts as not fresh.
+  std::span<const TickRecord> step(std::span<const DeviceReport> reports) noexcept;
+  /// The last tick of an arm; all zero before the first one, with the phase `off`.
+  [[nodiscard]] const TickRecord& last(std::size_t arm = 0) const noexcept;
+
+  /// Before the next step: a command of a person, `missed` ticks, `fade_in`; at most one of each
+  /// and in this order, since a log has room for so much a tick. Returns false, and changes
+  /// nothing, for another one, and for what the servo refuses: a tool that the scene lacks, an undo
+  /// of nothing.
+  bool apply(const ServoCommand& command) noexcept;
+
+  /// Volume number `volume` of the scene.
+  [[nodiscard]] VoxelView voxels(std::size_t volume) const noexcept;
+  /// Hash of all volumes as they are now: `volume_hash` of reports and replays.
+  [[nodiscard]] std::uint64_t volume_hash() const noexcept;
+
+  /// All that one tick hands to the next, copied. Cheap to copy itself; any thread.
+  class State;
+  /// The state between two ticks, and back to it: of this servo, or another one of the same scene.
+  /// `restore` throws Error if the scene differs. Both allocate.
+  [[nodiscard]] State keep() const;
+  void restore(const State& state);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+class Servo::State {
+  struct Kept;
+  friend class Servo;
+  explicit State(std::shared_ptr<const Kept> kept) noexcept : kept_(std::move(kept)) {}
+  std::shared_ptr<const Kept> kept_;
+};
+
+}  // namespace kerf
