@@ -11,7 +11,7 @@
 
 #include "record/npy_header.hpp"
 #include "shared/posix/error_text.hpp"
-#include "shared/segment/layout_table.hpp"
+#include "shared/segment/tick_table.hpp"
 #include "shared/volume/checksum.hpp"
 
 namespace kerf {
@@ -27,8 +27,7 @@ namespace {
 
 std::string tick_log_header(std::uint64_t rows) {
   std::string columns;
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record != "TickRecord") continue;
+  for (const auto& [field, unit, made, meaning, valid] : kTickFields) {
     columns += "('" + std::string(field.name) + "', '" + numpy_type(field.type) + "'";
     if (field.count > 1) columns += ", (" + std::to_string(field.count) + ",)";
     columns += "), ";

@@ -38,7 +38,7 @@ class DamagedRecording : public RecordError {
 /// that was split goes on in further files of the same form, which sort behind it: ticks.npy,
 /// ticks.npy.0002, ticks.npy.0003 and so on.
 ///
-/// The column table is generated from `layout_table.hpp`. The row count in the header is updated at
+/// The column table is generated from `tick_table.hpp`. The row count in the header is updated at
 /// every `sync`; later rows are complete, too, but after a power cut the last of them may be torn.
 inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 

@@ -11,7 +11,7 @@
 #include <type_traits>
 
 #include "shared/segment/layout.hpp"
-#include "shared/segment/layout_table.hpp"
+#include "shared/segment/tick_table.hpp"
 
 // The numbers of a tick record as text, column by column.
 
@@ -20,9 +20,7 @@ namespace kerf {
 /// Calls `visit(field)` for each column of a log, in order.
 template <class Visit>
 void for_each_column(Visit visit) {
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record == "TickRecord") visit(field);
-  }
+  for (const TickField& field : kTickFields) visit(field.layout);
 }
 
 /// Calls `use` with one number of a column, in its own type.

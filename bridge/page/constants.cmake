@@ -46,8 +46,8 @@ macro(codes file name pattern)
   string(APPEND text "export const ${name} = {${value}};\n")
 endmacro()
 
-macro(record name)
-  take(shared/segment/layout_table.hpp "(${name}, [^\n]*.*KERF_FIELD\\(${name}, [^\n]*)" "record ${name}")
+macro(record name file)
+  take(${file} "(${name}, [^\n]*.*KERF_FIELD\\(${name}, [^\n]*)" "record ${name}")
   string(REGEX MATCHALL "${name}, [a-z_0-9]+, [0-9a-fx]+, \"[a-z0-9]+\", [0-9]+" fields "${value}")
   set(rows "")
   foreach(field ${fields})
@@ -59,9 +59,9 @@ macro(record name)
 endmacro()
 
 string(APPEND text "/** Name, offset, type and count of each field. */\nexport const records = {\n")
-record(VolumeDescriptor)
-record(TickRecord)
-record(DirtyRecord)
+record(VolumeDescriptor shared/segment/layout_table.hpp)
+record(TickRecord shared/segment/tick_table.hpp)
+record(DirtyRecord shared/segment/layout_table.hpp)
 string(APPEND text "};\n")
 
 constants(bridge/wire/messages.hpp kProtocol kMaxRawBytes kHelloMagic kFrameMagic kRecordsMagic kReplyMagic
@@ -71,8 +71,8 @@ constants(include/kerf/tick.hpp kFlagContact kFlagDeviceFault kFlagForbidden kFl
 enumeration(shared/segment/layout.hpp Lifecycle)
 enumeration(shared/segment/command.hpp CommandKind)
 enumeration(shared/segment/command.hpp ReplyStatus)
-codes(shared/segment/log_columns.cpp kFaults kFaults)
-codes(shared/segment/log_columns.cpp kPhases kPhases)
+codes(shared/segment/tick_table.hpp kFaults kTickFaults)
+codes(shared/segment/tick_table.hpp kPhases kTickPhases)
 
 constants(visualizer/scene/camera.cpp kHalfHeightRad kHomeYawRad kHomePitchRad kMaxPitchRad kZoomStep
   kMargin kNearest kFarthest kNearPlane)

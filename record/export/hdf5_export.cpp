@@ -19,7 +19,7 @@
 #include "record/tick_text.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/segment/log_columns.hpp"
+#include "shared/segment/tick_table.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
@@ -101,10 +101,10 @@ void put_number(hid_t object, const char* name, std::uint64_t number) {
 }
 
 /// Several texts of one attribute, each padded to the longest.
-void put_codes(hid_t object, std::span<const LogCode> codes) {
+void put_codes(hid_t object, std::span<const TickCode> codes) {
   std::vector<std::string> lines;
   std::size_t longest = 1;
-  for (const LogCode& code : codes) {
+  for (const TickCode& code : codes) {
     lines.push_back(std::to_string(code.value) + " " + std::string(code.name) +
                     (code.meaning.empty() ? "" : ": " + std::string(code.meaning)));
     longest = std::max(longest, lines.back().size());
@@ -120,10 +120,10 @@ void put_codes(hid_t object, std::span<const LogCode> codes) {
 }
 
 /// What a column means, with all its codes or bits.
-std::string description_of(const LogColumn& column) {
+std::string description_of(const TickField& column) {
   std::string text(column.meaning);
   const char* before = "; ";
-  for (const LogCode& code : log_codes(column.name)) {
+  for (const TickCode& code : tick_codes(column.layout.name)) {
     text += before + std::to_string(code.value) + " " + std::string(code.name);
     if (!code.meaning.empty()) text += " (" + std::string(code.meaning) + ")";
     before = ", ";
@@ -134,12 +134,12 @@ std::string description_of(const LogColumn& column) {
 /// One column of the log as a dataset that grows.
 class Column {
  public:
-  Column(hid_t group, const LayoutField& field, const LogColumn& meaning)
-      : field_(field), dataset_(create(group, field), H5Dclose) {
-    put_text(dataset_, "units", meaning.unit);
-    put_text(dataset_, "description", description_of(meaning));
-    put_text(dataset_, "valid", meaning.valid.empty() ? "in every row" : meaning.valid);
-    if (const auto codes = log_codes(field.name); !codes.empty()) put_codes(dataset_, codes);
+  Column(hid_t group, const TickField& column)
+      : field_(column.layout), dataset_(create(group, field_), H5Dclose) {
+    put_text(dataset_, "units", column.unit);
+    put_text(dataset_, "description", description_of(column));
+    put_text(dataset_, "valid", column.valid.empty() ? "in every row" : column.valid);
+    if (const auto codes = tick_codes(field_.name); !codes.empty()) put_codes(dataset_, codes);
   }
 
   /// Adds the column of `rows` behind the `before` rows that it has.
@@ -178,31 +178,32 @@ class Column {
                       H5P_DEFAULT);
   }
 
-  const LayoutField& field_;
+  LayoutField field_;
   Handle dataset_;
   std::vector<std::byte> values_;
 };
 
 std::vector<Column> columns_in(hid_t group) {
   std::vector<Column> out;
-  const LogColumn* meaning = log_columns().data();
-  for_each_column([&](const LayoutField& field) { out.emplace_back(group, field, *meaning++); });
+  for (const TickField& field : kTickFields) out.emplace_back(group, field);
   return out;
 }
 
 /// The column of times, which no log has.
-constexpr LayoutField kTimeField{"", "time_ns", offsetof(TickRecord, start_ns), "i64", 1, 0, 0, ""};
-
-LogColumn time_column(const LogClock& clock) {
-  if (!clock.has_date()) return {"time_ns", "ns", "start_ns: when the tick began, CLOCK_MONOTONIC"};
-  return {"time_ns", "ns", "when the tick began: UTC, since 1970-01-01, without leap seconds"};
+TickField time_column(const LogClock& clock) {
+  return {.layout = {"", "time_ns", offsetof(TickRecord, start_ns), "i64", 1, 0, 0, ""},
+          .unit = "ns",
+          .made = {},
+          .meaning = clock.has_date()
+                         ? "when the tick began: UTC, since 1970-01-01, without leap seconds"
+                         : "start_ns: when the tick began, CLOCK_MONOTONIC"};
 }
 
 void write_ticks(hid_t file, const char* name, const std::filesystem::path& path,
                  TickLogReader& log, TickRange range, const LogClock& clock) {
   const Handle group(H5Gcreate2(file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
   std::vector<Column> columns = columns_in(group);
-  Column times(group, kTimeField, time_column(clock));
+  Column times(group, time_column(clock));
   std::vector<TickRecord> rows;
   hsize_t written = 0;
   const auto flush = [&] {

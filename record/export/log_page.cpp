@@ -6,8 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "shared/segment/layout_table.hpp"
-#include "shared/segment/log_columns.hpp"
+#include "shared/segment/tick_table.hpp"
 
 namespace kerf {
 namespace {
@@ -182,7 +181,7 @@ A running controller can be plotted without a log: [Foxglove](second-machine.md)
 
     ./kerf record live --udp 127.0.0.1:9870
 
-This page is made from the table in `shared/segment/log_columns.cpp` by
+This page is made from the table in `shared/segment/tick_table.hpp` by
 
     ./kerf record columns > docs/log.md
 
@@ -192,22 +191,23 @@ This page is made from the table in `shared/segment/log_columns.cpp` by
 |---|---|---|---|---|
 )";
 
-std::string page_row(const LayoutField& field, const LogColumn& column) {
+std::string page_row(const TickField& column) {
+  const LayoutField& field = column.layout;
   std::string type(field.type);
   if (field.count > 1) type += " x " + std::to_string(field.count);
   std::string meaning(column.meaning);
-  if (!log_codes(column.name).empty()) {  // "bits" or "code: ...", with a table on the page
+  if (!tick_codes(field.name).empty()) {  // "bits" or "code: ...", with a table on the page
     meaning.insert(std::min(meaning.find(':'), meaning.size()), ", below");
   }
-  return "| `" + std::string(column.name) + "` | " + type + " | " + std::string(column.unit) +
+  return "| `" + std::string(field.name) + "` | " + type + " | " + std::string(column.unit) +
          " | " + meaning + " | " + (column.valid.empty() ? "always" : std::string(column.valid)) +
          " |\n";
 }
 
-std::string codes(std::string_view title, std::string_view number, std::span<const LogCode> list) {
+std::string codes(std::string_view title, std::string_view number, std::span<const TickCode> list) {
   std::string text = "\n## " + std::string(title) + "\n\n| " + std::string(number) +
                      " | name | meaning |\n|---|---|---|\n";
-  for (const LogCode& code : list) {
+  for (const TickCode& code : list) {
     text += "| " + std::to_string(code.value) + " | " + std::string(code.name) + " | " +
             std::string(code.meaning) + " |\n";
   }
@@ -218,12 +218,9 @@ std::string codes(std::string_view title, std::string_view number, std::span<con
 
 std::string log_page() {
   std::string page(kHead);
-  std::size_t row = 0;
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record == "TickRecord") page += page_row(field, log_columns()[row++]);
-  }
-  return page + codes("Flags", "bit", log_flags()) + codes("Commands", "command", log_commands()) +
-         codes("Phases", "phase", log_phases()) + codes("Faults", "fault", log_faults());
+  for (const TickField& field : kTickFields) page += page_row(field);
+  return page + codes("Flags", "bit", kTickFlags) + codes("Commands", "command", kTickCommands) +
+         codes("Phases", "phase", kTickPhases) + codes("Faults", "fault", kTickFaults);
 }
 
 }  // namespace kerf

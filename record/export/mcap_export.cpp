@@ -18,7 +18,7 @@
 #include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
-#include "shared/segment/layout_table.hpp"
+#include "shared/segment/tick_table.hpp"
 #include "shared/segment/ros_messages.hpp"
 #include "shared/text/json.hpp"
 
@@ -29,8 +29,7 @@ namespace {
 /// nothing.
 constexpr bool has_no_padding() {
   std::uint32_t end = 0;
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record != "TickRecord") continue;
+  for (const auto& [field, unit, made, meaning, valid] : kTickFields) {
     if (field.offset != end) return false;
     end += type_bytes(field.type) * field.count;
   }

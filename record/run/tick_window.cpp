@@ -5,13 +5,13 @@
 #include <utility>
 
 #include "shared/segment/layout.hpp"
-#include "shared/segment/log_columns.hpp"
+#include "shared/segment/tick_table.hpp"
 
 namespace kerf {
 namespace {
 
 std::string fault_word(std::uint32_t fault) {
-  for (const LogCode& code : log_faults()) {
+  for (const TickCode& code : kTickFaults) {
     if (code.value == fault) return std::string(code.name);
   }
   return "fault-" + std::to_string(fault);

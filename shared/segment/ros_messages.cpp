@@ -6,8 +6,7 @@
 #include <cstddef>
 #include <span>
 
-#include "shared/segment/layout_table.hpp"
-#include "shared/segment/log_columns.hpp"
+#include "shared/segment/tick_table.hpp"
 
 namespace kerf {
 namespace {
@@ -104,27 +103,24 @@ std::string tick_definition() {
   std::string text =
       "# A tick of kerf's servo. docs/log.md has the same columns; made by `kerf record columns "
       "--msg`.\n";
-  auto column = log_columns().begin();
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record != "TickRecord") continue;
+  for (const TickField& row : kTickFields) {
+    const LayoutField& field = row.layout;
     const std::string many = field.count > 1 ? "[" + std::to_string(field.count) + "]" : "";
-    for (const LogCode& code : log_codes(field.name)) {
+    for (const TickCode& code : tick_codes(field.name)) {
       text += ros_type(field.type) + " " + constant_name(field.name, code.name) + "=" +
               std::to_string(code.value) +
               (code.meaning.empty() ? "" : "  # " + std::string(code.meaning)) + "\n";
     }
-    const std::string unit = column->unit.empty() ? "" : std::string(column->unit) + ": ";
+    const std::string unit = row.unit.empty() ? "" : std::string(row.unit) + ": ";
     text += ros_type(field.type) + many + " " + std::string(field.name) + "  # " + unit +
-            std::string(column->meaning) + "\n";
-    ++column;
+            std::string(row.meaning) + "\n";
   }
   return text;
 }
 
 void put_tick(const TickRecord& record, CdrWriter message) {
   const auto* const bytes = reinterpret_cast<const std::byte*>(&record);
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record != "TickRecord") continue;
+  for (const auto& [field, unit, made, meaning, valid] : kTickFields) {
     message.numbers(bytes + field.offset, type_bytes(field.type), field.count);
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/segment/log_columns.hpp"
+#include "shared/segment/tick_table.hpp"
 
 #include <doctest/doctest.h>
 
@@ -15,18 +15,18 @@ TEST_CASE("docs/log.md is what the table says") {
 }
 
 TEST_CASE("the page's codes are the servo's") {
-  for (const LogCode& code : log_faults()) {
+  for (const TickCode& code : std::span(kTickFaults)) {
     CHECK(code.name == fault_name(static_cast<Fault>(code.value)));
   }
-  CHECK(fault_name(static_cast<Fault>(log_faults().size())) == std::string_view("unknown"));
-  CHECK(log_phases().size() == static_cast<std::size_t>(Phase::fault) + 1);
-  CHECK(log_phases()[static_cast<std::size_t>(Phase::ramping)].name == "ramping");
-  for (std::size_t i = 0; i < log_phases().size(); ++i) CHECK(log_phases()[i].value == i);
+  CHECK(fault_name(static_cast<Fault>(std::span(kTickFaults).size())) == std::string_view("unknown"));
+  CHECK(std::span(kTickPhases).size() == static_cast<std::size_t>(Phase::fault) + 1);
+  CHECK(std::span(kTickPhases)[static_cast<std::size_t>(Phase::ramping)].name == "ramping");
+  for (std::size_t i = 0; i < std::span(kTickPhases).size(); ++i) CHECK(std::span(kTickPhases)[i].value == i);
 }
 
 TEST_CASE("every flag that a record can have is on the page, once") {
   std::uint32_t seen = 0;
-  for (const LogCode& flag : log_flags()) {
+  for (const TickCode& flag : kTickFlags) {
     CHECK((seen & flag.value) == 0);
     seen |= flag.value;
   }

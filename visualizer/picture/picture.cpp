@@ -12,7 +12,7 @@
 
 #include <glm/gtc/matrix_access.hpp>
 
-#include "shared/segment/log_columns.hpp"
+#include "shared/segment/tick_table.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/sound/spindle_sound.hpp"
@@ -45,9 +45,9 @@ glm::dvec3 direction_of(const ClipPlane& plane) {
 }
 
 /// The name of a code of docs/log.md.
-std::string name_of(std::span<const LogCode> codes, std::uint32_t value) {
+std::string name_of(std::span<const TickCode> codes, std::uint32_t value) {
   const auto found =
-      std::ranges::find_if(codes, [&](const LogCode& code) { return code.value == value; });
+      std::ranges::find_if(codes, [&](const TickCode& code) { return code.value == value; });
   return found == codes.end() ? std::to_string(value) : std::string(found->name);
 }
 
@@ -67,7 +67,7 @@ std::string state_words(const TickRecord& record) {
                "or "
                "start again if it lies there";
       }
-      return "fault " + name_of(log_faults(), record.fault) +
+      return "fault " + name_of(kTickFaults, record.fault) +
              ": the motors are off; park the device at rest (a hand led by the pointer: k)";
     default:
       return {};
@@ -110,7 +110,7 @@ SecondArmFigures second_arm_figures(const TickRecord& record, const SceneView& s
   return {.force_n = glm::length(vec3(record.commanded_force_n)),
           .tool = tool_name(record, scene),
           .state =
-              has_fault ? name_of(log_faults(), record.fault) : name_of(log_phases(), record.phase),
+              has_fault ? name_of(kTickFaults, record.fault) : name_of(kTickPhases, record.phase),
           .alarm = has_fault};
 }
 

@@ -51,10 +51,36 @@ def struct_table(file, name, stated=None, told=None):
     return f"{size} bytes.\n\n" + table(("byte", "field", "type", *(["unit"] if told else []), "meaning"), shown)
 
 
+FIELD = r'KERF_FIELD\((\w+), (\w+), (\w+), "(\w+)", (\d+)\)'
+
+
+def stated_in(*sources):
+    """Of each record its fields as the tables state them: (offset, name, type, count)."""
+    stated = {}
+    for record, name, at, kind, count in re.findall(FIELD, "".join(source.text for source in sources)):
+        stated.setdefault(record, []).append((int(at, 0), name, kind, int(count)))
+    return stated
+
+
 def log_columns(root):
     """Unit and meaning of each field of a tick, from the log's page, which has a test of its own."""
     rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| ([^|]*) \| ([^|]+) \| [^|]+ \|$", Source(root, "docs/log.md").text, re.M)
     return {name: (unit.strip(), meaning.replace(", below", ", told there")) for name, unit, meaning in rows}
+
+
+def numpy_tick(root, programs):
+    """The module of the reader that has the type of a row."""
+    table = Source(root, "shared/segment/tick_table.hpp")
+    rows, line = [], "   "
+    for _, name, kind, count in stated_in(table)["TickRecord"]:
+        word = f' ("{name}", "<{kind[0]}{int(kind[1:]) // 8}"' + (f", {count})" if count > 1 else ")") + ","
+        if len(line + word) > 120:
+            rows.append(line)
+            line = "   "
+        line += word
+    rows.append(line.rstrip(",") + "])")
+    return ('# SPDX-License-Identifier: Apache-2.0\n"""The row of a log, which is the record of a tick in the segment.\n\n'
+            f'Made by tests/docs/reference/make.py from {table.path}."""\nimport numpy as np\n\nTICK = np.dtype([\n' + "\n".join(rows) + "\n")
 
 
 def choices(file, name):
@@ -68,9 +94,7 @@ def choices(file, name):
 def segment(root, programs):
     file, fields = Source(root, "shared/segment/layout.hpp"), Source(root, "shared/segment/layout_table.hpp")
     homes = {"TickRecord": Source(root, "include/kerf/tick.hpp")}
-    stated = {}
-    for record, name, at, kind, count in re.findall(r'KERF_FIELD\((\w+), (\w+), (\w+), "(\w+)", (\d+)\)', fields.text):
-        stated.setdefault(record, []).append((int(at, 0), name, kind, int(count)))
+    stated = stated_in(fields, Source(root, "shared/segment/tick_table.hpp"))
     told = {"TickRecord": log_columns(root)}
     parts = [f"## `{name}`\n\n{what}{struct_table(homes.get(name, file), name, stated[name], told.get(name))}\n" for name, what in (
         ("SegmentHeader", "At byte 0, one page. Each word that changes has a line of 64 bytes of its own; `lifecycle` shares that of "

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The reference pages of docs/ that are made from sources and programs:  make.py ROOT BIN check|write
+"""The reference pages of docs/, and the type of a tick in Python, that are made from sources and programs:
+make.py ROOT BIN check|write
 
-check: each page is what it would be if it were made now. A key, a field or a program that came, went or changed its
+check: each file is what it would be if it were made now. A key, a field or a program that came, went or changed its
 limits makes a difference, or is told as a lack."""
 import difflib
 import pathlib
@@ -17,9 +18,22 @@ import script_keys
 import wire
 from source import Lack
 
-PAGES = {"script-keys.md": script_keys.page, "segment.md": layouts.segment, "wire.md": wire.page,
-         "reports.md": lambda *where: f"{reports.page(*where).rstrip()}\n\n{exit_codes.section(*where)}"}
 BY = "Made by `tests/docs/reference/make.py` from what the programs say and from their source.\n"
+
+
+def page(text):
+    """A page of docs/ with a line that says where it comes from."""
+    title, rest = text.rstrip("\n").split("\n", 1)
+    return f"{title}\n\n{BY}{rest}\n"
+
+
+FILES = {
+    "docs/script-keys.md": lambda *where: page(script_keys.page(*where)),
+    "docs/segment.md": lambda *where: page(layouts.segment(*where)),
+    "docs/wire.md": lambda *where: page(wire.page(*where)),
+    "docs/reports.md": lambda *where: page(f"{reports.page(*where).rstrip()}\n\n{exit_codes.section(*where)}"),
+    "python/kerf_reader/tick.py": layouts.numpy_tick,
+}
 
 
 class Programs:
@@ -41,20 +55,20 @@ class Programs:
 
 def main(root, programs, mode):
     wrong = 0
-    for name, page in PAGES.items():
+    for name, make in FILES.items():
         try:
-            title, rest = page(root, programs).rstrip("\n").split("\n", 1)
+            made = make(root, programs)
         except Lack as lack:
-            print(f"docs/{name}: {lack}")
+            print(f"{name}: {lack}")
             wrong += 1
             continue
-        made, file = f"{title}\n\n{BY}{rest}\n", root / "docs" / name
+        file = root / name
         if mode == "write":
             file.write_text(made, encoding="utf-8")
         before = file.read_text(encoding="utf-8") if file.exists() else ""
-        sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), f"docs/{name}", "now", n=0))
+        sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), name, "now", n=0))
         wrong += before != made
-    print(f"{len(PAGES)} pages, {wrong} wrong; renew them: make.py ROOT BIN write")
+    print(f"{len(FILES)} files, {wrong} wrong; renew them: make.py ROOT BIN write")
     return not wrong
 
 
