@@ -18,8 +18,8 @@
 #include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
-#include "shared/segment/tick_table.hpp"
 #include "shared/segment/ros_messages.hpp"
+#include "shared/segment/tick_table.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {

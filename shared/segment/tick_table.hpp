@@ -11,10 +11,11 @@
 #include "shared/segment/layout_field.hpp"
 
 // The table of a tick: each field of `TickRecord` once, with type, unit, stage of the step, meaning
-// and validity; bits and codes. From it come the layout's hash, the columns of logs and of what they
-// are exported to, messages of ROS 2, the stages of a replay, docs/log.md and the types of
+// and validity; bits and codes. From it come the layout's hash, the columns of logs and of what
+// they are exported to, messages of ROS 2, the stages of a replay, docs/log.md and the types of
 // python/kerf_reader. A new field stands in include/kerf/tick.hpp and here; then run
-// `./kerf record columns > docs/log.md` and `tests/docs/reference/make.py . build/release/bin write`.
+// `./kerf record columns > docs/log.md` and `tests/docs/reference/make.py . build/release/bin
+// write`.
 
 namespace kerf {
 

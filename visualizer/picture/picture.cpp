@@ -107,11 +107,11 @@ std::string tool_name(const TickRecord& record, const SceneView& scene) {
 
 SecondArmFigures second_arm_figures(const TickRecord& record, const SceneView& scene) {
   const bool has_fault = record.fault != 0;
-  return {.force_n = glm::length(vec3(record.commanded_force_n)),
-          .tool = tool_name(record, scene),
-          .state =
-              has_fault ? name_of(kTickFaults, record.fault) : name_of(kTickPhases, record.phase),
-          .alarm = has_fault};
+  return {
+      .force_n = glm::length(vec3(record.commanded_force_n)),
+      .tool = tool_name(record, scene),
+      .state = has_fault ? name_of(kTickFaults, record.fault) : name_of(kTickPhases, record.phase),
+      .alarm = has_fault};
 }
 
 }  // namespace
