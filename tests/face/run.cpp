@@ -21,6 +21,7 @@ int main(int argc, char** argv) try {
   for (std::string script; std::getline(scripts, script, ',');) {
     hands.emplace_back(scene, script, "", hands.size());
   }
+  if (hands.size() != scene.arms()) throw kerf::Error("HAND: give one for each arm");
   kerf::LogWriter log(argv[3], scene);
   std::vector<kerf::DeviceReport> reports(scene.arms());
   for (long tick = 0; tick < std::atol(argv[4]); ++tick) {
