@@ -5,6 +5,8 @@ Its test compares all with a log and with a running controller of the same build
 and a segment with another one is refused."""
 import numpy as np
 
+from .tick import TICK  # noqa: F401  of the rings
+
 MAGIC = int.from_bytes(b"KERFSHM1", "little")
 VERSION = (1, 4)
 ABI = 0xCF3BEB3F32128E50
