@@ -38,7 +38,7 @@ press >"$home/press.txt" || fail "press: $(cat "$home/press.txt")"
 awk '$1 > 0.1 { met++; if ($3 / $1 < 0.499 || $3 / $1 > 0.501) bad++ } END { exit !(NR == 16 && met >= 4 && !bad) }' "$home/press.txt" ||
   fail "press: $(cat "$home/press.txt")"
 kerf record check "$home/pressed" >/dev/null || fail 'press: its recording is not sound'
-[[ $(press 2>&1) == "press: $home/pressed: "* ]] || fail 'press: writes over a recording'
+[[ $(press 2>&1) == "press: $home/pressed/ticks.npy: holds a recording; "* ]] || fail 'press: writes over a recording'
 
 kerf-emulator --socket "$home/socket" --hand "$scenes/hands/touch.toml" >/dev/null 2>&1 &
 until [[ -e $home/socket ]]; do sleep 0.02; done
