@@ -15,6 +15,14 @@ GradientRows::Entry entry_of(const glm::vec3& gradient) {
   return {part(gradient.x), part(gradient.y), part(gradient.z), 0};
 }
 
+/// `box`, and the border beside it where it ends with the volume.
+VoxelBox with_border(const VoxelBox& box, const VoxelGrid& grid) {
+  const auto low = [](std::int32_t lo) { return lo == 0 ? -1 : lo; };
+  const auto high = [](std::int32_t hi, std::int32_t end) { return hi == end ? end + 1 : hi; };
+  return {{low(box.lo.x), low(box.lo.y), low(box.lo.z)},
+          {high(box.hi.x, grid.nx), high(box.hi.y, grid.ny), high(box.hi.z, grid.nz)}};
+}
+
 }  // namespace
 
 std::size_t GradientRows::entry_count(const VoxelGrid& grid) noexcept {
@@ -27,11 +35,14 @@ GradientRows::GradientRows(const GradientPlan& plan, const VoxelGrid& grid,
                            std::span<const Density> density)
     : plan_(plan), grid_(grid), entries_(entry_count(grid), kNone) {
   constexpr std::int32_t kThick = 16;  // a layer is worked out by one thread
-  const auto layers = static_cast<std::uint32_t>((grid.nz + kThick - 1) / kThick);
+  const VoxelBox all = grid.box().grown(1);
+  const auto layers = static_cast<std::uint32_t>((all.extent().z + kThick - 1) / kThick);
   TilePool().run(layers, [&](std::uint32_t layer) {
-    const auto z = static_cast<std::int32_t>(layer) * kThick;
+    VoxelBox box = all;
+    box.lo.z += static_cast<std::int32_t>(layer) * kThick;
+    box.hi.z = std::min(box.lo.z + kThick, all.hi.z);
     Work work;
-    fill(VoxelBox{{0, 0, z}, {grid.nx, grid.ny, z + kThick}}.clipped(grid.box()), density, work);
+    fill(box, density, work);
   });
 }
 
@@ -50,7 +61,10 @@ void GradientRows::fill(const VoxelBox& box, std::span<const Density> density, W
 std::vector<VoxelBox> GradientRows::update(const ChangedBricks& changed,
                                            std::span<const Density> density) {
   std::vector<VoxelBox> boxes = plan_.around(changed, BrickGrid::of(grid_));
-  for (const VoxelBox& box : boxes) fill(box, density, work_);
+  for (VoxelBox& box : boxes) {
+    box = with_border(box, grid_);
+    fill(box, density, work_);
+  }
   return boxes;
 }
 

@@ -15,7 +15,9 @@ namespace kerf {
 
 /// The density gradient at each voxel, for all that shades surfaces: on the processor, on
 /// the GPU, at the vertices of a mesh, and to find out what of a picture must be drawn again.
-/// Interpolated between voxels. In a border of none, as the density: voxel v is at v + 1.
+/// Interpolated between voxels. Around the volume is a border one voxel wide, of air: voxel v is at
+/// v + 1. It has gradients, too: the face of a volume one voxel thick lies between its voxel, whose
+/// gradient is 0, and the border.
 class GradientRows {
  public:
   /// 32768 + 32767 g along each axis, g in -1..1; the last is nothing. GL's RGBA16.
@@ -28,8 +30,8 @@ class GradientRows {
   /// What a volume of this extent takes.
   [[nodiscard]] static std::size_t entry_count(const VoxelGrid& grid) noexcept;
 
-  /// Call after voxels have `changed` in `density`, which is all of the volume. Returns the voxels
-  /// whose gradients may have.
+  /// Call after voxels have `changed` in `density`, which is all of the volume. Returns the voxels,
+  /// and what of the border, whose gradients may have.
   std::vector<VoxelBox> update(const ChangedBricks& changed, std::span<const Density> density);
 
   [[nodiscard]] const GradientPlan& plan() const noexcept { return plan_; }

@@ -24,7 +24,7 @@ VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
                   kFineCellVox),
       gradient_(GradientPlan(gradient, volume.edges_mm()), volume.bricks.grid, content.density),
       gradient_texture_(volume.bricks.grid, kGradientTexel, GradientRows::kNone.data()) {
-  gradient_texture_.upload_from(gradient_.data(), volume.bricks.grid.box(), kBorder);
+  gradient_texture_.upload_from(gradient_.data(), volume.bricks.grid.box().grown(kBorder), kBorder);
 }
 
 void VolumeOnGpu::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
