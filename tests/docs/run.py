@@ -104,10 +104,10 @@ def furnish(folder, root, bin_folder):
 def fault_of(command, expected, folder, environment):
     """What is wrong with a command, or nothing. Where the page shows its output, a line that ends in ... goes on."""
     try:
-        done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=folder, env=environment, timeout=100,
+        done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=folder, env=environment, timeout=600,
                               capture_output=True, text=True, stdin=subprocess.DEVNULL)
     except subprocess.TimeoutExpired:
-        return "still busy after 100 s"
+        return "still busy after 600 s"
     if done.returncode:
         return f"exit code {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
     for shown, line in zip(expected, done.stdout.splitlines() + [""] * len(expected)):
