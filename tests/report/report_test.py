@@ -82,7 +82,7 @@ PICTURES = {"day": "a day", "processor": "a processor", "gl_renderer": "a driver
             "rows": [picture("iso", 0, False, 50), picture("iso", 16, False, 40), picture("iso", 16, True, 4),
                      picture("cast", 0, False, 8)],
             "gradients": [{"gradient": "adaptive", "angle_deg": 0.5, "noisy_angle_deg": 1.25, "p99_deg": 1, "milled_angle_deg": 2,
-                           "milled_p99_deg": 3, "thick_5_p99_deg": 4, "thick_10_p99_deg": 5}]}
+                           "milled_p99_deg": 3, "thick_2_p99_deg": 3.5, "thick_5_p99_deg": 4, "thick_10_p99_deg": 5}]}
 
 WALL = {"name": "a wall", "paper_most_n": 0.5, "paper_unfelt_mm": 1,
         "presses": {"depth_mm": [0, 1], "paper_n": [0, 0.5], "proxy_n": [0, 1]},

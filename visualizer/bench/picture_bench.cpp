@@ -148,8 +148,9 @@ std::vector<GradientRow> measure_gradients() {
   const BallStage stage;
   const std::vector<Density> clean = ball(stage, 0.0), noisy = ball(stage, kNoise);
   const std::vector<Density> milled = hollow(stage);
-  const BallStage of_5(5), of_10(10);
-  const std::vector<Density> thick_5 = ball(of_5, 0.0), thick_10 = ball(of_10, 0.0);
+  const BallStage of_2(2), of_5(5), of_10(10);
+  const std::vector<Density> thick_2 = ball(of_2, 0.0), thick_5 = ball(of_5, 0.0),
+                             thick_10 = ball(of_10, 0.0);
   std::vector<GradientRow> rows;
   for (std::size_t i = 0; i < kGradientNames.size(); ++i) {
     const auto gradient = static_cast<GradientFilter>(i);
@@ -157,6 +158,7 @@ std::vector<GradientRow> measure_gradients() {
     const Angles of_hollow = angles_of(stage, gradient, milled, true);
     rows.push_back({gradient, of_ball.rms, angles_of(stage, gradient, noisy, false).rms,
                     of_ball.p99, of_hollow.rms, of_hollow.p99,
+                    angles_of(of_2, gradient, thick_2, false).p99,
                     angles_of(of_5, gradient, thick_5, false).p99,
                     angles_of(of_10, gradient, thick_10, false).p99});
   }
@@ -309,6 +311,7 @@ std::string picture_report(const PictureFigures& figures) {
                          {"p99_deg", row.p99_deg},
                          {"milled_angle_deg", row.milled_angle_deg},
                          {"milled_p99_deg", row.milled_p99_deg},
+                         {"thick_2_p99_deg", row.thick_2_p99_deg},
                          {"thick_5_p99_deg", row.thick_5_p99_deg},
                          {"thick_10_p99_deg", row.thick_10_p99_deg}});
   }

@@ -32,7 +32,8 @@ struct GradientRow {
   double p99_deg = 0.0;           ///< of 99 of 100 pixels of the ball
   double milled_angle_deg = 0.0;  ///< both in a hollow that a ball milled
   double milled_p99_deg = 0.0;
-  double thick_5_p99_deg = 0.0;  ///< on a ball in voxels of 1 x 1 x 5, and of 1 x 1 x 10
+  double thick_2_p99_deg = 0.0;  ///< on a ball in voxels of 1 x 1 x 2, of 1 x 1 x 5, of 1 x 1 x 10
+  double thick_5_p99_deg = 0.0;
   double thick_10_p99_deg = 0.0;
 };
 

@@ -69,7 +69,7 @@ TEST_CASE("the bench's report has a row for each kind of frame") {
                                      row("cast", 0, false, 8.0)};
   const PictureFigures figures{
       .rows = rows,
-      .gradients = {{GradientFilter::corners, 0.5, 1.25, 2.5, 3.0, 4.5, 5.5, 6.5}},
+      .gradients = {{GradientFilter::corners, 0.5, 1.25, 2.5, 3.0, 4.5, 5.0, 5.5, 6.5}},
       .gl_renderer = "a driver",
       .size = {512, 512},
       .cores = 2};
@@ -84,6 +84,7 @@ TEST_CASE("the bench's report has a row for each kind of frame") {
   CHECK(report["rows"][1]["fps"].get<double>() == doctest::Approx(250.0));
   CHECK(report["gradients"][0]["noisy_angle_deg"] == 1.25);
   CHECK(report["gradients"][0]["milled_p99_deg"] == 4.5);
+  CHECK(report["gradients"][0]["thick_2_p99_deg"] == 5.0);
   CHECK(report["gradients"][0]["thick_5_p99_deg"] == 5.5);
   CHECK(report["gradients"][0]["thick_10_p99_deg"] == 6.5);
 }
@@ -113,6 +114,7 @@ TEST_CASE("the default gradient shades balls and milled hollows within 3 degrees
     CAPTURE(row.thick_10_p99_deg);
     CHECK((row.thick_10_p99_deg < 3.0) == is_default);
     if (is_default) CHECK(row.thick_5_p99_deg < 1.5);
+    if (is_default) CHECK(row.thick_2_p99_deg < 1.0);
     CHECK((row.noisy_angle_deg < 0.5) == (is_default || row.gradient == GradientFilter::farid5));
   }
 }
