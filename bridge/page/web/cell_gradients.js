@@ -75,8 +75,14 @@ export function joined(boxes) {
   return made;
 }
 
-/** Numbers of a box, x fastest. */
-const fieldOf = size => ({size, values: new Float32Array(countOf(size))});
+const scratch = [];
+
+/** Numbers of a box, x fastest, of any value, until the next one in this slot: a block needs megabytes of them. */
+function fieldOf(size, slot) {
+  const count = countOf(size);
+  if (!(scratch[slot]?.length >= count)) scratch[slot] = new Float32Array(count);
+  return {size, values: scratch[slot].subarray(0, count)};
+}
 
 /** Of each row along x of a box, the part that is wanted: from `first` to before `end`. */
 class Rows {
@@ -103,10 +109,10 @@ class Rows {
   }
 }
 
-/** Taps along one axis, which becomes shorter by their reach at both ends; zeros where nothing is wanted. `sign` is 1 if
- * they are even and -1 if they are odd: a slope is 0 where all voxels are alike. */
-function filtered(from, axis, taps, reach, sign, rows) {
-  const to = fieldOf(rows.size), half = taps.slice(reach);
+/** What is wanted of taps along one axis, which becomes shorter by their reach at both ends. `sign` is 1 if they are even
+ * and -1 if they are odd: a slope is 0 where all voxels are alike. */
+function filtered(from, axis, taps, reach, sign, rows, slot) {
+  const to = fieldOf(rows.size, slot), half = taps.slice(reach);
   const [nx, ny] = from.size, {values: input} = from, {values: output} = to;
   const stride = [1, nx, nx * ny][axis];
   for (let z = 0, row = 0, out = 0; z < rows.size[2]; ++z) {
@@ -132,13 +138,32 @@ const scaleOf = (slope, smooth, other, perCell) =>
 /** The gradient's parts of the wanted cells within `field`, which reaches as far beyond them as the taps do. */
 function partsOf([x, y, z], field, perCell, rows) {
   const forZ = rows.readAlong(2, z.reach), forY = forZ.readAlong(1, y.reach);
-  const smooth = (from, axis, {smooth: taps, reach}, wanted) => filtered(from, axis, taps, reach, 1, wanted);
-  const slope = (from, axis, {slope: taps, reach}, wanted) => filtered(from, axis, taps, reach, -1, wanted);
-  const smoothX = smooth(field, 0, x, forY), slopeX = slope(field, 0, x, forY);
+  const smooth = (slot, from, axis, {smooth: taps, reach}, wanted) => filtered(from, axis, taps, reach, 1, wanted, slot);
+  const slope = (slot, from, axis, {slope: taps, reach}, wanted) => filtered(from, axis, taps, reach, -1, wanted, slot);
+  const smoothX = smooth(1, field, 0, x, forY), slopeX = slope(2, field, 0, x, forY);
   const part = (found, a, b, c, axis) => ({values: found.values, scale: scaleOf(a, b, c, perCell[axis])});
-  return [part(smooth(smooth(slopeX, 1, y, forZ), 2, z, rows), x, y, z, 0),
-    part(smooth(slope(smoothX, 1, y, forZ), 2, z, rows), y, z, x, 1),
-    part(slope(smooth(smoothX, 1, y, forZ), 2, z, rows), z, x, y, 2)];
+  return [part(smooth(4, smooth(3, slopeX, 1, y, forZ), 2, z, rows), x, y, z, 0),
+    part(smooth(5, slope(3, smoothX, 1, y, forZ), 2, z, rows), y, z, x, 1),
+    part(slope(6, smooth(3, smoothX, 1, y, forZ), 2, z, rows), z, x, y, 2)];
+}
+
+/** The gradients of the wanted cells that are marked, if `marks` is there, and the rows of those that are not 0. */
+function gathered(parts, rows, marks) {
+  const [{values: xs, scale: sx}, {values: ys, scale: sy}, {values: zs, scale: sz}] = parts;
+  const gradients = new Float32Array(4 * countOf(rows.size)), sloped = new Rows(rows.size);
+  for (let row = 0; row < rows.first.length; ++row) {
+    for (let x = rows.first[row]; x < rows.end[row]; ++x) {
+      const i = row * rows.size[0] + x;
+      if (marks && marks[i] === 0) continue;
+      const gx = sx * xs[i], gy = sy * ys[i], gz = sz * zs[i];
+      if (gx === 0 && gy === 0 && gz === 0) continue;
+      gradients[4 * i] = gx;
+      gradients[4 * i + 1] = gy;
+      gradients[4 * i + 2] = gz;
+      sloped.take(row, x, x + 1);
+    }
+  }
+  return {gradients, sloped};
 }
 
 /** In place, the narrow gradients of these rows with the direction of the wide ones where this hardly differs. */
@@ -196,13 +221,18 @@ export function surfaceVoxels({size: [nx, ny, nz], density}, iso, low, high) {
   return any ? marks : null;
 }
 
-/** The rows of those that `has(i)`. */
-function rowsOf(size, has) {
+function markedRows(size, marks) {
   const rows = new Rows(size);
   for (let row = 0, i = 0; row < size[1] * size[2]; ++row) {
-    for (let x = 0; x < size[0]; ++x, ++i) if (has(i)) rows.take(row, x, x + 1);
+    for (let x = 0; x < size[0]; ++x, ++i) if (marks[i] !== 0) rows.take(row, x, x + 1);
   }
   return rows;
+}
+
+function isFlat(values) {
+  let i = 0;
+  while (i < values.length && values[i] === values[0]) ++i;
+  return i === values.length;
 }
 
 const kBlock = 32;  // cells of an edge: most of a volume is air, or solid, and has no gradient
@@ -246,7 +276,8 @@ export class CellGradients {
 
   /** The mean densities of a box, zeros outside of the volume. */
   field(low, high) {
-    const field = fieldOf(extentOf(low, high));
+    const field = fieldOf(extentOf(low, high), 0);
+    field.values.fill(0);
     const [nx, ny] = field.size, {grid, means} = this;
     const x0 = Math.max(low[0], 0), x1 = Math.min(high[0], grid[0]);
     for (let z = Math.max(low[2], 0); z < Math.min(high[2], grid[2]); ++z) {
@@ -279,15 +310,9 @@ export class CellGradients {
     const around = taps => this.field(low.map((n, axis) => n - taps[axis].reach),
       high.map((n, axis) => n + taps[axis].reach));
     const field = around(plan.narrow);
-    if (field.values.every(value => value === field.values[0])) return null;
-    const wanted = marks ? rowsOf(size, i => marks[i] !== 0) : new Rows(size, 0, size[0]);
-    const narrow = partsOf(plan.narrow, field, perCell, wanted);
-    const gradients = new Float32Array(4 * countOf(size));
-    for (const axis of axes) {
-      const {values, scale} = narrow[axis];
-      for (let i = 0; i < values.length; ++i) if (!marks || marks[i] !== 0) gradients[4 * i + axis] = scale * values[i];
-    }
-    const sloped = rowsOf(size, i => gradients[4 * i] !== 0 || gradients[4 * i + 1] !== 0 || gradients[4 * i + 2] !== 0);
+    if (isFlat(field.values)) return null;
+    const wanted = marks ? markedRows(size, marks) : new Rows(size, 0, size[0]);
+    const {gradients, sloped} = gathered(partsOf(plan.narrow, field, perCell, wanted), wanted, marks);
     adapt(gradients, partsOf(plan.wide, around(plan.wide), perCell, sloped), sloped);
     return gradients;
   }

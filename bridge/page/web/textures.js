@@ -138,8 +138,12 @@ class FineCellsOnGpu {
 function directionBytes(vectors) {
   const bytes = new Int8Array(vectors.length);
   for (let at = 0; at < vectors.length; at += 4) {
-    const size = Math.hypot(vectors[at], vectors[at + 1], vectors[at + 2]);
-    for (let i = at; size > 0 && i < at + 3; ++i) bytes[i] = Math.round(127 / size * vectors[i]);
+    const x = vectors[at], y = vectors[at + 1], z = vectors[at + 2], square = x * x + y * y + z * z;
+    if (square === 0) continue;
+    const scale = 127 / Math.sqrt(square);
+    bytes[at] = Math.round(scale * x);
+    bytes[at + 1] = Math.round(scale * y);
+    bytes[at + 2] = Math.round(scale * z);
   }
   return bytes;
 }
@@ -267,8 +271,8 @@ class GradientTexels {
       cells.blocks(box, (low, high, gradients) => {
         const texels = gradientTexels(volume, low, high, !this.begun && !gradients);
         if (!texels) return;  // as the texture is at first
-        for (let at = 0; gradients && at < texels.length; ++at) {
-          if (at % 4 < 3) texels[at] = gradientByte(gradients[at]);
+        for (let at = 0; gradients && at < texels.length; at += 4) {
+          for (let i = at; i < at + 3; ++i) texels[i] = gradientByte(gradients[i]);
         }
         voxels.upload(low, high, texels);
       });
