@@ -256,8 +256,9 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   const RecordedScene recorded = read_scene(folder);
   const SceneSource source = changed(recorded.source, changes);
   run.scene = load_scene(source, recorded_inputs(folder, recorded.inputs, changes));
-  run.canonical = canonical_json(run.scene);
-  run.scene_json = json_with_source(run.canonical, run.scene, source);
+  Json json = scene_json(run.scene);
+  run.canonical = json.canonical();
+  run.scene_json = json_with_source(std::move(json), run.scene, source);
   if (keep_volumes(changes)) check_same_volumes(folder, recorded.canonical, run.canonical);
   if (changes.none()) {
     check_same(folder, recorded.canonical, run.canonical);

@@ -64,9 +64,10 @@ LoadedScene one_armed(LoadedScene scene) {
 
 /// The segment of the scene, with the JSON that readers get.
 SegmentWriter segment_of(const LoadedScene& scene, const SceneSource& source) {
-  const std::string json = canonical_json(scene);
-  const std::string with_source = json_with_source(json, scene, source);
-  return SegmentWriter::create(segment_spec(scene, with_source, fnv1a(json)), true);
+  Json json = scene_json(scene);
+  const std::uint64_t config_hash = fnv1a(json.canonical());
+  const std::string with_source = json_with_source(std::move(json), scene, source);
+  return SegmentWriter::create(segment_spec(scene, with_source, config_hash), true);
 }
 
 }  // namespace

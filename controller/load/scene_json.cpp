@@ -90,7 +90,7 @@ Json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
 
 }  // namespace
 
-std::string canonical_json(const LoadedScene& scene, SceneKeys keys) {
+Json scene_json(const LoadedScene& scene, SceneKeys keys) {
   Json volumes = Json::List{};
   for (const SceneVolume& volume : scene.volumes) volumes.push_back(volume_json(volume));
   Json tools = Json::List{};
@@ -118,7 +118,11 @@ std::string canonical_json(const LoadedScene& scene, SceneKeys keys) {
     parts.material = material;
     root["materials"].push_back(table_json("material", parts, keys));
   }
-  return root.canonical();
+  return root;
+}
+
+std::string canonical_json(const LoadedScene& scene, SceneKeys keys) {
+  return scene_json(scene, keys).canonical();
 }
 
 namespace {
@@ -191,9 +195,7 @@ LoadedScene load_scene(const SceneSource& source, RecordedInputs recorded) {
   return load_scene(source.path, source.text, source.overrides, std::move(recorded));
 }
 
-std::string json_with_source(const std::string& canonical, const LoadedScene& scene,
-                             const SceneSource& source) {
-  Json root = Json::parse(canonical);
+std::string json_with_source(Json root, const LoadedScene& scene, const SceneSource& source) {
   root[kSource] = json_of(source);
   for (const Material& material : scene.volumes.front().proposed) {
     root[kSource]["proposed"].push_back(

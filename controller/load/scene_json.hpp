@@ -9,13 +9,14 @@
 #include "controller/load/load_scene.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/scene/scene_keys.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 
-/// The scene as readers of the segment and of recordings get it: JSON text on one line, keys
-/// sorted, numbers as a short text that reads back equal. The same scene gives the same text
-/// on every machine, so its path is left out and a volume's `file` is the text of the scene. Its
-/// fnv1a hash identifies everything that determines a run.
+/// The scene as readers of the segment and of recordings get it; `canonical_json` is its text, on
+/// one line, keys sorted, numbers as a short text that reads back equal. The same scene gives the
+/// same text on every machine, so its path is left out and a volume's `file` is the text of the
+/// scene. Its fnv1a hash identifies everything that determines a run.
 ///
 ///   volumes    [{name, file, iso (u16), solid, spacing_mm, grid, pose {position_mm, orientation},
 ///              density_hash}]
@@ -27,6 +28,7 @@ namespace kerf {
 ///   second_device, second_limits, second_tool  if there are two arms
 ///   materials [..], scene, device, force, cut, spindle, limits, servo  as the rows of the table of
 ///              keys say (`InJson`), of the models that the scene has
+[[nodiscard]] Json scene_json(const LoadedScene& scene, SceneKeys keys = scene_keys());
 [[nodiscard]] std::string canonical_json(const LoadedScene& scene, SceneKeys keys = scene_keys());
 
 /// What a scene was loaded from. If its volumes and meshes have not changed, loading it again gives
@@ -45,9 +47,9 @@ struct SceneSource {
 /// As `load_scene` of its path. Throws LoadError.
 [[nodiscard]] LoadedScene load_scene(const SceneSource& source, RecordedInputs recorded = {});
 
-/// `canonical`, the `canonical_json` of a scene, with one more member `source`: what the scene was
-/// loaded from, and the materials that were proposed for its first volume.
-[[nodiscard]] std::string json_with_source(const std::string& canonical, const LoadedScene& scene,
+/// The canonical text of `root`, the `scene_json` of a scene, with one more member `source`: what
+/// the scene was loaded from, and the materials that were proposed for its first volume.
+[[nodiscard]] std::string json_with_source(Json root, const LoadedScene& scene,
                                            const SceneSource& source);
 
 /// The volumes and meshes in such a text. A volume has no density and no labels yet, only their

@@ -25,6 +25,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/segment.hpp"
+#include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
@@ -152,9 +153,9 @@ PlannedScene checked_scene(const ControllerOptions& options, RunReport& report) 
 SegmentWriter new_segment(const ControllerOptions& options, const PlannedScene& planned,
                           RunReport& report) {
   const LoadedScene& scene = planned.scene;
-  const std::string json = canonical_json(scene);
-  report.config_hash = fnv1a(json);
-  const std::string with_source = json_with_source(json, scene, planned.source);
+  Json json = scene_json(scene);
+  report.config_hash = fnv1a(json.canonical());
+  const std::string with_source = json_with_source(std::move(json), scene, planned.source);
   const SegmentSpec spec = segment_spec(scene, with_source, report.config_hash);
   check_memory(scene, planned.servo->costs(), plan_segment(spec).header.total_bytes);
   if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <span>
 #include <sstream>
+#include <utility>
 
 #include "controller/input/load_error.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
@@ -47,8 +48,8 @@ std::vector<Point> fibonacci_ball(double radius_mm, int count) {
   std::vector<Point> samples;
   for (int i = 0; i < count; ++i) {
     const double y = 2 * (i + kFirst) / (count - 1 + 2 * kFirst) - 1, across = std::sqrt(1 - y * y);
-    samples.push_back({radius_mm * across * cosine(i * kGoldenAngle), radius_mm * y,
-                       radius_mm * across * sine(i * kGoldenAngle)});
+    const auto [x, z] = on_circle(i * kGoldenAngle);
+    samples.push_back({radius_mm * across * x, radius_mm * y, radius_mm * across * z});
   }
   return samples;
 }
@@ -60,8 +61,10 @@ std::vector<std::span<const std::array<double, 2>>> smooth_parts(const Profile& 
     return arctangent(profile[k + 1][1] - profile[k][1], profile[k + 1][0] - profile[k][0]);
   };
   std::size_t first = 0;
+  double before = heading(0);
   for (std::size_t k = 1; k + 1 < profile.size(); ++k) {
-    if (std::abs(heading(k) - heading(k - 1)) < kRimAngle) continue;
+    const double here = heading(k);
+    if (std::abs(here - std::exchange(before, here)) < kRimAngle) continue;
     parts.emplace_back(profile.data() + first, k - first + 1);
     first = k;
   }
@@ -117,8 +120,7 @@ class RingSampler {
         std::max(1, static_cast<int>(std::lround(area_mm2 / (pitch_mm_ * pitch_mm_))));
     turn_ += kGoldenAngle;
     for (int i = 0; i < count; ++i) {
-      const double angle = turn_ + 2 * std::numbers::pi * i / count;
-      const double x = cosine(angle), z = sine(angle);
+      const auto [x, z] = on_circle(turn_ + 2 * std::numbers::pi * i / count);
       samples_.push_back(
           {{radius_mm * x, y_mm, radius_mm * z}, {outward * x, upward, outward * z}});
     }

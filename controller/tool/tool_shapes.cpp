@@ -75,15 +75,19 @@ HeadGrid head_grid(std::string_view shape, const ToolSize& size) {
 void cover_surface(const SceneTool& tool, SampleLattice& lattice) {
   const double apart_mm = tool.pitch_mm / 4;
   const double long_mm = std::numbers::pi / 2 * (tool.length_mm + tool.radius_mm);
+  std::vector<CirclePoint> ring;  // of radius 1, as the last one had it
   for (const auto& [y_mm, radius_mm] :
        tool_profile(tool, static_cast<int>(std::ceil(long_mm / apart_mm)))) {
     // As many in each eighth, so that all are alike.
     const double eighth_mm = std::numbers::pi / 4 * radius_mm;
     const int count = 8 * std::max(1, static_cast<int>(std::ceil(eighth_mm / apart_mm)));
-    for (int i = 0; i < count; ++i) {
-      const double angle = 2 * std::numbers::pi * i / count;
-      lattice.cover({radius_mm * cosine(angle) / tool.pitch_mm, y_mm / tool.pitch_mm,
-                     radius_mm * sine(angle) / tool.pitch_mm});
+    if (ring.size() != static_cast<std::size_t>(count)) {
+      ring.clear();
+      for (int i = 0; i < count; ++i) ring.push_back(on_circle(2 * std::numbers::pi * i / count));
+    }
+    for (const auto& [x, z] : ring) {
+      lattice.cover(
+          {radius_mm * x / tool.pitch_mm, y_mm / tool.pitch_mm, radius_mm * z / tool.pitch_mm});
     }
   }
 }

@@ -148,6 +148,15 @@ struct SineCosine {
   return elementary::sine_cosine({angle}).cosine.high;
 }
 
+/// Both, for the cost of one.
+struct CirclePoint {
+  double cosine, sine;
+};
+[[nodiscard]] inline CirclePoint on_circle(double angle) noexcept {
+  const elementary::SineCosine at = elementary::sine_cosine({angle});
+  return {at.cosine.high, at.sine.high};
+}
+
 /// In -pi .. pi; 0 for (0, 0).
 [[nodiscard]] inline double arctangent(double y, double x) noexcept {
   return elementary::arc({y}, {x}).high;

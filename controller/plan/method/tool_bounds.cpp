@@ -44,8 +44,7 @@ class Spans {
     if (rings.empty()) return;
     diameter_ = hypotenuse(rings.rbegin()->first - rings.begin()->first, 2 * widest);
     for (std::size_t i = 0; i < by_angle_.size(); ++i) {
-      const double angle = static_cast<double>(i) * kStep;
-      const double along = cosine(angle), across = sine(angle);
+      const auto [along, across] = on_circle(static_cast<double>(i) * kStep);
       double up = -1e9, down = -1e9;
       for (const auto& [height, radius] : rings) {
         up = std::max(up, height * along + radius * across);
@@ -164,17 +163,18 @@ std::vector<VoxelIndex> box_sizes(const SceneTool& tool, const SceneVolume& volu
   constexpr int kDirections = 96;  // along each angle of one octant; the others are alike
   constexpr double kStep = kRightAngle / kDirections;
   const double slack = kStep * std::numbers::sqrt2 / 2;
+  std::array<CirclePoint, kDirections> circle;
+  for (int i = 0; i < kDirections; ++i) circle[std::size_t(i)] = on_circle((i + 0.5) * kStep);
   const Spans spans(tool.offsets);
+  const auto cells = [&](std::size_t axis, double cosine) {
+    return cells_of(spans.most(cosine, slack) * tool.pitch_mm / volume.image.spacing_mm[axis]);
+  };
   std::vector<VoxelIndex> sizes;
-  for (int i = 0; i < kDirections; ++i) {
-    const double polar = (i + 0.5) * kStep, out = sine(polar);
-    for (int j = 0; j < kDirections; ++j) {
-      const double around = (j + 0.5) * kStep;
-      const auto cells = [&](std::size_t axis, double cosine) {
-        return cells_of(spans.most(cosine, slack) * tool.pitch_mm / volume.image.spacing_mm[axis]);
-      };
-      sizes.push_back(
-          {cells(0, out * cosine(around)), cells(1, out * sine(around)), cells(2, cosine(polar))});
+  for (const auto& [up, out] : circle) {
+    const std::int32_t high = cells(2, up);
+    for (const auto& [right, back] : circle) {
+      const VoxelIndex size{cells(0, out * right), cells(1, out * back), high};
+      if (sizes.empty() || !(sizes.back() == size)) sizes.push_back(size);
     }
   }
   const auto key = [](const VoxelIndex& v) { return std::tuple(v.x, v.y, v.z); };
