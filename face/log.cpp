@@ -19,6 +19,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/segment/writer.hpp"
+#include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 #include "shared/volume/checksum.hpp"
 
@@ -27,7 +28,7 @@ namespace {
 
 /// What a recorder knows of a run: the constant part of its segment.
 SegmentInfo info_of(const Scene::Loaded& loaded) {
-  const std::string json = json_with_source(loaded.json, loaded.scene, loaded.source);
+  const std::string json = json_with_source(Json::parse(loaded.json), loaded.scene, loaded.source);
   const SegmentWriter writer =
       SegmentWriter::create(segment_spec(loaded.scene, json, loaded.config_hash), true);
   return SegmentReader::map(writer.fd()).info();

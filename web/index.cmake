@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The bridge's index.html, begun by try.js. cmake -DOUTPUT=FILE -DPAGE=FILE -P index.cmake
+# The bridge's index.html, begun by servo.js and try.js, with what these need asked for at once, in the order in which it is needed.
+# cmake -DOUTPUT=FILE -DPAGE=FILE -DMODULES=FOLDER -P index.cmake     MODULES: all that the page imports, generated ones too
 cmake_minimum_required(VERSION 3.25)
 file(READ ${PAGE} text)
 set(begins "<script type=\"module\" src=\"kerf.js\"></script>")
@@ -7,9 +8,31 @@ string(FIND "${text}" "${begins}" at)
 if(at EQUAL -1)
   message(FATAL_ERROR "index.cmake: ${PAGE} has no ${begins}; name what begins the page")
 endif()
-string(REPLACE "${begins}" "<script type=\"module\" src=\"try.js\"></script>
-<link rel=\"modulepreload\" href=\"kerf.js\">
-<link rel=\"stylesheet\" href=\"try.css\">" text "${text}")
+# Breadth first: the imports of a module stand behind it. A worker fetches its own.
+set(modules servo.js try.js)
+set(links "")
+set(at 0)
+while(TRUE)
+  list(LENGTH modules count)
+  if(at EQUAL count)
+    break()
+  endif()
+  list(GET modules ${at} module)
+  math(EXPR at "${at} + 1")
+  file(READ ${MODULES}/${module} source)
+  string(REGEX MATCHALL "(from |import\\()'\\./[a-z_]+\\.js'" imports "${source}")
+  list(TRANSFORM imports REPLACE ".*'\\./(.*)'" "\\1")
+  list(APPEND modules ${imports})
+  list(REMOVE_DUPLICATES modules)
+  if(NOT module MATCHES "^(servo|try)\\.js$")
+    string(APPEND links "\n<link rel=\"modulepreload\" href=\"${module}\">")
+  endif()
+endwhile()
+string(REGEX REPLACE "\n<link rel=\"modulepreload\" href=\"[a-z_]+\\.js\">" "" text "${text}")
+string(REPLACE "${begins}" "<script type=\"module\" src=\"servo.js\"></script>
+<link rel=\"preload\" as=\"fetch\" crossorigin href=\"kerf.wasm\">
+<script type=\"module\" src=\"try.js\"></script>
+<link rel=\"stylesheet\" href=\"try.css\">${links}" text "${text}")
 # A run here has its own words for what a bridge says. Those of a link to it: title, description, picture.
 set(title "kerf in your browser: mill a tooth")
 set(description "A haptic milling controller, an emulated device and a tooth, in one tab: lead the bur with mouse, finger or keys and \

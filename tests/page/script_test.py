@@ -36,6 +36,8 @@ with tempfile.TemporaryDirectory() as temporary:
     subprocess.run(["cmake", f"-DOUTPUT={folder / 'scene_texts.js'}", f"-DROOT={ROOT}", "-P", ROOT / "web/scene_texts.cmake"], check=True)
     # A shader is never compiled here.
     (folder / "shaders.js").write_text("export const head = '', shaders = new Proxy({}, {get: () => ({vertex: '', fragment: ''})});")
+    subprocess.run(["cmake", f"-DOUTPUT={folder / 'tab.html'}", f"-DPAGE={folder / 'index.html'}", f"-DMODULES={folder}",
+                    "-P", ROOT / "web/index.cmake"], check=True)
     names = sys.argv[1:] or sorted(file.stem for file in folder.glob("*.mjs") if file.stem not in HELPERS)
     failed = []
     for name in names:

@@ -10,10 +10,11 @@ import {ReplayControls} from './replay.js';
 import {controlKeys, runKeys, runPairs} from './run_keys.js';
 import {texts} from './scene_texts.js';
 import {scenes} from './scenes.js';
+import {broken, compiled, lack, worker} from './servo.js';
 import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
-const state = {ready: false, replays: false, asked: 0, page: null, steering: null, worker: null, shown: null, replay: null,
+const state = {ready: false, given: false, replays: false, asked: 0, page: null, steering: null, worker, shown: null, replay: null,
   told: {text: 'loading', trouble: false}, sets: new Map(), seconds: 0, pace: 1};  // sets: what differs from the scene's own values, by key
 
 /** What the link does not know: there is no run, or not yet. It speaks again with the hello of the next one. */
@@ -28,14 +29,6 @@ function tell(text, trouble = false) {
 function refuse(text) {
   missing('page', text);
   tell('not started', true);
-}
-
-/** Why this browser cannot run kerf; '' where it can. */
-function lack() {
-  if (typeof WebAssembly !== 'object') return 'This browser has no WebAssembly, or it is switched off: use a newer one, or switch it on for this page.';
-  if (typeof Worker !== 'function') return 'This browser has no workers; use a newer one.';
-  if (typeof BigInt !== 'function' || typeof WebAssembly.Global !== 'function') return 'This browser is too old; use a newer one.';
-  return '';
 }
 
 // -- Controls
@@ -130,7 +123,7 @@ function ask() {
   return () => mine === state.asked;
 }
 
-/** Before the module is there nothing is sent: the controls are read once it is. */
+/** Before the worker is given the module nothing is sent: the controls are read once it is. */
 function start(event) {
   const {target} = event ?? {};
   if (target && address.refused) address.refuse('');
@@ -140,7 +133,7 @@ function start(event) {
   } else if (target?.id in controlKeys) {
     state.sets.set(controlKeys[target.id], target.value);
   }
-  if (!state.ready || address.refused) return;
+  if (!state.given || address.refused) return;
   ask();
   state.replay.close();
   state.replays = false;
@@ -204,7 +197,6 @@ function showRows(rows) {
 const says = {
   ready: () => {
     state.ready = true;
-    if (state.asked === 0 || document.body.dataset.run === 'refused') start();
   },
   opened: ({opened}) => {
     element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
@@ -242,14 +234,16 @@ const says = {
   },
   // One that was under way when a run was asked for is late.
   replayed: ({replayed}) => state.replays && showRows(state.replay.show(replayed)),
-  failed: ({failed: text}) => state.ready ? failed(text) : refuse(text),
+  failed: ({failed: text}) => failed(text),
 };
 
 /** The bridge's page, with a link to the worker, which loads the scene meanwhile. */
 async function begin() {
   TabSocket.worker = state.worker;
   globalThis.WebSocket = TabSocket;
-  const [{Steering}, {KeySteering}] = await Promise.all([import('./steering.js'), import('./key_steering.js')]);
+  element('state').textContent = state.told.text;
+  // This thread makes the picture's context while the worker loads the scene, not before it has got one to load.
+  const [{Steering}, {KeySteering}] = await Promise.all([import('./steering.js'), import('./key_steering.js'), compiled.catch(() => {})]);
   state.page = await import('./kerf.js');
   if (!state.page.link.greeted) tell(state.told.text, state.told.trouble);  // the link has said since that it waits
   if (!state.page.stage) return;
@@ -258,13 +252,11 @@ async function begin() {
   state.steering.start(isMine() && !state.replays);
 }
 
-const why = lack();
-if (why) {
-  refuse(why);
+if (lack) {
+  refuse(lack);
 } else {
-  state.worker = new Worker(new URL('worker.js', import.meta.url), {type: 'module'});
-  state.worker.onerror = ({message}) => state.ready ? failed(`the servo of this tab has ended (${message}); load the page again`) :
-    refuse(`The servo of this tab did not start. ${whyNotStarted()} If all of that is so, use a newer browser: this one has no modules in workers.`);
+  broken.then(({message}) => state.ready ? failed(`the servo of this tab has ended (${message}); load the page again`) :
+    refuse(`The servo of this tab did not start. ${whyNotStarted()} If all of that is so, use a newer browser: this one has no modules in workers.`));
   state.worker.onmessage = ({data}) => {
     // Of a run that was on its way as the address was refused.
     if (address.refused && state.ready && !('reads' in data || 'refused' in data)) return;
@@ -277,5 +269,11 @@ if (why) {
   Object.assign(address, {keys: {...runKeys, ...address.keys}, parts: [() => runPairs(run()), ...address.parts],
     hearers: [take, ...address.hearers], refusers: [refuseAddress, ...address.refusers]});
   address.read();
+  // It takes the run behind the module, before this thread is busy with the picture.
+  compiled.then(module => {
+    state.worker.postMessage({module});
+    state.given = true;
+    if (state.asked === 0 || document.body.dataset.run === 'refused') start();
+  }, problem => refuse(problem.message));
   begin().catch(problem => refuse(whyNotStarted(problem)));
 }

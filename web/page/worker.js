@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The thread of the servo: steps a run at the pace of the clock, and posts what a bridge would send.
 //
-// In:  {open: inputs, pace, seconds}  another run; pace: seconds of the servo in one of the clock, 0: as fast as it can
+// In:  {module: WebAssembly.Module}   the first of all; answered by {ready: true}
+//      {open: inputs, pace, seconds}  another run; pace: seconds of the servo in one of the clock, 0: as fast as it can
 //      {up: ArrayBuffer} {join: true} {lead: [mm, rad, button]} {release: true} {pause: bool}
 //      {close: true}                  nothing runs any more
 //      {log: dropped files}           a recording in place of a run; {replay: what ReplayTurn takes}
-// Out: {opened: ms} {down: ArrayBuffer} {facts} {failed: text} {done: facts with volume_hash}
+// Out: {ready: true} {opened: ms} {down: ArrayBuffer} {facts} {failed: text} {done: facts with volume_hash}
 //      {refused: text}: what was dropped is no recording, the run goes on; {reads: folder}; {replayed: facts}
 import {KerfModule} from './kerf_module.js';
 import {readyFiles, recordingIn, ReplayTurn} from './replay_turn.js';
@@ -17,6 +18,8 @@ const kBehindMs = 100;  // of the servo's time: more is not made up for
 const kFactsMs = 200;
 
 let compiled = null, kerf = null;
+let given;
+const begun = new Promise(resolve => given = resolve);  // with the module; where it cannot be had, the page says why
 let joined = false;  // there is a viewer: the page's own modules may come after the run
 let opening = 0;     // counts what was asked for: files are read meanwhile
 let hidden = false;  // the page is in the background
@@ -59,7 +62,6 @@ function open({open: inputs, pace = 1, seconds = 0}) {
 
 async function openLog({log}) {
   await begun;
-  if (!compiled) return;  // the page says why
   let folder, ready;
   try {
     folder = recordingIn(log);
@@ -136,6 +138,12 @@ function turn() {
 }
 
 const takes = {
+  module: ({module}) => {
+    compiled = module;
+    postMessage({ready: true});
+    given();
+    turn();
+  },
   open: message => open(message),
   up: ({up}) => {
     kerf.take(up);
@@ -165,42 +173,5 @@ const takes = {
 onmessage = ({data}) => {
   if ('log' in data) return openLog(data);
   const kind = Object.keys(takes).find(name => name in data);
-  if (kerf || ['open', 'join', 'pause'].includes(kind)) attempt(() => takes[kind](data));
+  if (kerf || ['module', 'open', 'join', 'pause'].includes(kind)) attempt(() => takes[kind](data));
 };
-
-async function moduleBytes() {
-  let answer, bytes;
-  try {
-    answer = await fetch(new URL('kerf.wasm', import.meta.url));
-    bytes = await answer.arrayBuffer();
-  } catch {
-    throw new Error("kerf.wasm: did not come, since the network or its server is not reached, or a policy's connect-src forbids it; " +
-      'load the page again once it can');
-  }
-  if (!answer.ok) throw new Error(`kerf.wasm: ${answer.status}; serve the whole folder`);
-  if (String(new Uint8Array(bytes.slice(0, 4))) !== '0,97,115,109') {
-    throw new Error('kerf.wasm: something else came in its place; serve the whole folder');
-  }
-  return bytes;
-}
-async function compile(bytes) {
-  if (!WebAssembly.validate(bytes)) throw new Error('This browser runs no WebAssembly with SIMD; use a newer one.');
-  try {
-    return await WebAssembly.compile(bytes);
-  } catch (problem) {
-    if (problem instanceof RangeError) throw new Error('memory: none is left to compile kerf.wasm; close other tabs, then load the page again');
-    // It is sound, as was seen before.
-    throw new Error("A policy (Content-Security-Policy) forbids WebAssembly here; have the server add 'wasm-unsafe-eval' to its script-src.");
-  }
-}
-
-async function begin() {
-  try {
-    compiled = await compile(await moduleBytes());
-    postMessage({ready: true});
-    turn();
-  } catch (problem) {
-    postMessage({failed: problem.message});
-  }
-}
-const begun = begin();

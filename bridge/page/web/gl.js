@@ -17,6 +17,8 @@ export function enableExtensions(gl) {
   if (!gl.getExtension('EXT_color_buffer_float')) {
     throw new Error('The WebGL 2 of this browser cannot draw into floating-point textures (EXT_color_buffer_float).');
   }
+  gl.getExtension('KHR_parallel_shader_compile');  // where there is one, programs are linked beside this thread
+  programs.delete(gl);
 }
 
 /** Throws where what was asked of `gl` since the last time could not be done. It waits for the GPU. A
@@ -30,14 +32,25 @@ export function requireNoError(gl) {
   throw new Error(`This browser's WebGL 2 refuses the picture (error ${error}); load the page again`);
 }
 
-/** A linked program of shaders.js. Uniforms are set by name; one that the linker removed is ignored. */
-export class Program {
-  constructor(gl, name, defines = '') {
-    this.gl = gl;
+const programs = new WeakMap();  // of each context: by name and defines
+
+/** A program of shaders.js, which the context keeps. The first call lets the driver begin with it and does not wait: called before the
+ * volumes have come, it is linked when they have. */
+export function programOf(gl, name, defines = '') {
+  if (!programs.has(gl)) programs.set(gl, new Map());
+  const known = programs.get(gl), key = `${name} ${defines}`;
+  if (!known.has(key)) known.set(key, new Program(gl, name, defines));
+  return known.get(key);
+}
+
+/** A program of `programOf`. Uniforms are set by name; one that the linker removed is ignored. */
+class Program {
+  constructor(gl, name, defines) {
+    Object.assign(this, {gl, name, linked: false});
     this.program = gl.createProgram();
     this.locations = new Map();
     const stages = [[gl.VERTEX_SHADER, shaders[name].vertex], [gl.FRAGMENT_SHADER, shaders[name].fragment]];
-    const made = stages.map(([kind, text]) => {
+    this.stages = stages.map(([kind, text]) => {
       const shader = gl.createShader(kind);
       gl.shaderSource(shader, head + defines + text);
       gl.compileShader(shader);
@@ -45,18 +58,21 @@ export class Program {
       return shader;
     });
     gl.linkProgram(this.program);
-    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
-      const log = [...made.map(one => gl.getShaderInfoLog(one)), gl.getProgramInfoLog(this.program)];
-      throw new Error(`This browser's WebGL 2 refuses the shader ${name}: ${log.filter(Boolean)[0]}`);
-    }
-    for (const shader of made) gl.deleteShader(shader);
   }
 
+  /** Waits until it is linked; throws why it cannot be. */
   use() {
+    if (!this.linked) this.requireLinked();
     this.gl.useProgram(this.program);
   }
-  free() {
-    this.gl.deleteProgram(this.program);
+  requireLinked() {
+    const {gl, program, stages} = this;
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      const log = [...stages.map(one => gl.getShaderInfoLog(one)), gl.getProgramInfoLog(program)];
+      throw new Error(`This browser's WebGL 2 refuses the shader ${this.name}: ${log.filter(Boolean)[0]}`);
+    }
+    for (const shader of stages) gl.deleteShader(shader);
+    this.linked = true;
   }
   at(uniform) {
     if (!this.locations.has(uniform)) {

@@ -4,14 +4,20 @@
 import {clippedRect, grownRect, isEmptyRect, screenBounds, unitedRect} from './camera.js';
 import {cellPlan} from './cell_gradients.js';
 import {kPaletteWidth} from './constants.js';
-import {bind, cover, Program, requireNoError, Target, texture} from './gl.js';
+import {bind, cover, programOf, requireNoError, Target, texture} from './gl.js';
 import {boxCorners} from './math.js';
 import {BlendCaster, Entries, IsoCaster, mostBlended} from './renderers.js';
 import {SolidOnGpu, TranslucentOnGpu} from './textures.js';
-import {HandPainter, sameHand, toolBounds} from './tool.js';
+import {HandPainter, kMetal, kPlain, sameHand, toolBounds} from './tool.js';
 import {palette} from './transfer_function.js';
 
 const kSmoothingReach = 3;  // pixels
+
+/** Lets the driver begin with the programs of a picture by iso, while its volumes are on their way. */
+export function beginPrograms(gl) {
+  for (const name of ['iso', 'cell_faces', 'backdrop', 'smooth', 'shown']) programOf(gl, name);
+  for (const surface of [kMetal, kPlain]) programOf(gl, 'mesh', surface);
+}
 
 /** The layers of one eye, kept from frame to frame. */
 export class Eye {
@@ -69,9 +75,9 @@ export class Painter {
     this.palette = texture(gl, gl.TEXTURE_2D, gl.RGBA16F, gl.LINEAR, [kPaletteWidth, 2]);
     this.byDensity = texture(gl, gl.TEXTURE_2D, gl.RGBA16F, gl.LINEAR, [kPaletteWidth, Math.max(this.blended, 1)]);
     this.uploadPalettes(rows);
-    this.backdrop = new Program(gl, 'backdrop');
-    this.smooth = new Program(gl, 'smooth');
-    this.shown = new Program(gl, 'shown');
+    this.backdrop = programOf(gl, 'backdrop');
+    this.smooth = programOf(gl, 'smooth');
+    this.shown = programOf(gl, 'shown');
     this.entries = new Entries(gl);
     this.iso = this.solids.length > 0 ? new IsoCaster(gl) : null;
     this.blend = this.blended > 0 ? new BlendCaster(gl, this.translucents) : null;
@@ -212,8 +218,7 @@ export class Painter {
   }
 
   free() {
-    for (const one of [...this.eyes, ...this.volumes, this.hand, this.backdrop, this.smooth, this.shown, this.entries,
-      this.iso, this.blend]) {
+    for (const one of [...this.eyes, ...this.volumes, this.hand]) {
       one?.free();
     }
     this.gl.deleteTexture(this.palette);

@@ -4,7 +4,7 @@
 import {clipFromEye, shownInEye} from './camera.js';
 import {surfaceMm} from './cell_gradients.js';
 import {kBlendStepVox} from './constants.js';
-import {bind, cover, Program} from './gl.js';
+import {bind, cover, programOf} from './gl.js';
 import {affineInverse, multiply, turn} from './math.js';
 import {leastExtinction} from './transfer_function.js';
 
@@ -26,7 +26,7 @@ function viewUniforms(view) {
 export class Entries {
   constructor(gl) {
     this.gl = gl;
-    this.faces = new Program(gl, 'cell_faces');
+    this.faces = programOf(gl, 'cell_faces');
   }
   draw(eye, layer, volume, view, part) {
     const {gl} = this;
@@ -44,16 +44,13 @@ export class Entries {
       multiply(view.eyeFromWorld, volume.cells.worldFromCell))});
     volume.cells.drawFaces();
   }
-  free() {
-    this.faces.free();
-  }
 }
 
 /** The surface of one volume, into the opaque layer. */
 export class IsoCaster {
   constructor(gl) {
     this.gl = gl;
-    this.iso = new Program(gl, 'iso');
+    this.iso = programOf(gl, 'iso');
     this.iso.use();
     this.iso.setInts({u_density: 0, u_label: 1, u_active_cell: 2, u_fine_cell: 3, u_entry_mm: 4,
       u_palette: 5, u_cell_gradient: 6});
@@ -72,9 +69,6 @@ export class IsoCaster {
     this.iso.set(volume.gradients.uniforms());
     cover(gl);
   }
-  free() {
-    this.iso.free();
-  }
 }
 
 /** What is seen inside of all volumes together, over what stands before it. */
@@ -84,9 +78,9 @@ export class BlendCaster {
     const each = volumes.map((_, v) => `f(${v})`).join(' ');
     const bools = of => `bool[](${volumes.map(of).join(', ')})`;
     const cells = volumes.some(({plan}) => !plan.cubes) ? `#define KERF_HAS_CELLS ${bools(({plan}) => !plan.cubes)}\n` : '';
-    this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n#define KERF_EACH_VOLUME(f) ${each}\n` +
+    this.cast = programOf(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n#define KERF_EACH_VOLUME(f) ${each}\n` +
       `#define KERF_HAS_LABELS ${bools(({volume}) => volume.labels !== null)}\n${cells}`);
-    this.layer = new Program(gl, 'layer');
+    this.layer = programOf(gl, 'layer');
     this.layer.use();
     this.layer.setInts({u_colour: 0, u_depth: 1});
     this.unit = kUnitsPerVolume * volumes.length;
@@ -140,9 +134,5 @@ export class BlendCaster {
     this.layer.use();
     cover(gl);
     gl.disable(gl.BLEND);
-  }
-  free() {
-    this.cast.free();
-    this.layer.free();
   }
 }

@@ -6,7 +6,7 @@ import {viewText} from './address.js';
 import {eyeViews, OrbitCamera} from './camera.js';
 import {kToolRoom} from './constants.js';
 import {contextOf, enableExtensions, requireNoError} from './gl.js';
-import {Painter} from './layers.js';
+import {beginPrograms, Painter} from './layers.js';
 import {mix} from './math.js';
 import {sceneIn} from './scene.js';
 import {sameHands} from './tool.js';
@@ -25,6 +25,7 @@ export class Stage {
   constructor(canvas, trouble) {
     Object.assign(this, {canvas, trouble});
     this.gl = contextOf(canvas);
+    beginPrograms(this.gl);
     this.camera = new OrbitCamera();
     this.look = {kinds: [], iso: null, opacities: {}, clip: {on: false, axis: 2, at: 0.5}, stereo: false};
     this.scale = 1;
@@ -47,6 +48,7 @@ export class Stage {
       this.fence = null;
       this.attempt(() => {
         enableExtensions(this.gl);
+        beginPrograms(this.gl);
         if (this.scene) this.rebuild();
       });
     });

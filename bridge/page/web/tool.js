@@ -3,7 +3,7 @@
 import {clipFromEye, screenBounds, unitedRect} from './camera.js';
 import {kArrowScalesPerN, kArrowThickness, kFaint, kForce, kHeadBare, kHeadLength, kHeadRadius,
   kLeastArrowN, kSteel} from './constants.js';
-import {GpuMesh, Program} from './gl.js';
+import {GpuMesh, programOf} from './gl.js';
 import {add, boxCorners, cross, fromAxes, length, multiply, normalized, normalMatrix, rigid, scaled, times,
   translated, turn} from './math.js';
 import {toolMesh, unitCone, unitCylinder} from './mesh.js';
@@ -72,12 +72,15 @@ export function toolBounds(scene, hand, view, width, height) {
     ends.map(pair => Math.max(...pair) + around)), view, width, height));
 }
 
+/** Of the program `mesh`. */
+export const kMetal = '#define KERF_METAL 1\n', kPlain = '#define KERF_METAL 0\n';
+
 /** Draws tool and force arrow into the place to draw, under its depth. */
 export class HandPainter {
   constructor(gl, scene) {
     Object.assign(this, {gl, scene});
-    this.metal = new Program(gl, 'mesh', '#define KERF_METAL 1\n');
-    this.plain = new Program(gl, 'mesh', '#define KERF_METAL 0\n');
+    this.metal = programOf(gl, 'mesh', kMetal);
+    this.plain = programOf(gl, 'mesh', kPlain);
     this.tools = scene.tools.map(tool => new GpuMesh(gl, toolMesh(tool)));
     this.cylinder = new GpuMesh(gl, unitCylinder());
     this.cone = new GpuMesh(gl, unitCone());
@@ -125,6 +128,6 @@ export class HandPainter {
   }
 
   free() {
-    for (const one of [...this.tools, this.cylinder, this.cone, this.metal, this.plain]) one.free();
+    for (const one of [...this.tools, this.cylinder, this.cone]) one.free();
   }
 }

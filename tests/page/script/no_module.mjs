@@ -8,17 +8,26 @@ import {openPage, pass, view} from './fake_page.mjs';
 
 const document = openPage(fs.readFileSync('index.html', 'utf8'));
 const element = id => document.getElementById(id);
-Object.defineProperty(globalThis, 'Worker', {configurable: true, value: class {
-  constructor() { globalThis.worker = this; }
+Object.defineProperty(globalThis, 'Worker', {configurable: true, value: class extends EventTarget {
+  constructor() {
+    super();
+    globalThis.worker = this;
+  }
   postMessage() {}
 }});
+let comes;
+const answer = new Promise(resolve => comes = resolve);
+globalThis.fetch = () => answer;
+WebAssembly.compileStreaming = async stream => {
+  if (!(await stream).ok) throw new TypeError('HTTP status code is not ok');
+};
 Object.defineProperty(globalThis, 'navigator', {configurable: true, value: {onLine: false}});
 Object.defineProperty(globalThis, 'matchMedia', {configurable: true, value: () => ({matches: false})});
 Object.assign(globalThis.location, {protocol: 'http:'});
 vm.runInThisContext(fs.readFileSync('start.js', 'utf8'));
 await import('./try.js');
-await import('./kerf.js');
-await new Promise(done => setImmediate(done));
+const settled = () => new Promise(done => setImmediate(() => setImmediate(done)));
+await settled();
 const shown = () => [element('state').textContent, element('missing').hidden ? '' : element('missing').textContent];
 
 test('until the module is there the page loads, and no bridge is named', () => {
@@ -27,15 +36,19 @@ test('until the module is there the page loads, and no bridge is named', () => {
   assert.deepEqual(shown(), ['loading', '']);
 });
 
-test('a servo that does not start says the cause and the cure', () => {
-  globalThis.worker.onerror({});
+test('a servo that does not start says the cause and the cure', async () => {
+  globalThis.worker.dispatchEvent(new Event('error'));
+  await settled();
   assert.match(shown()[1], /^The servo of this tab did not start\. A part of this page did not come\. This machine is offline/);
   assert.equal(shown()[0], 'not started');
 });
 
-test('a module that did not come stays told, whatever the address and the controls do', () => {
+test('a module that did not come stays told, whatever the address and the controls do', async () => {
   const why = 'kerf.wasm: 404; serve the whole folder';
-  globalThis.worker.onmessage({data: {failed: why}});
+  comes({ok: false, status: 404, arrayBuffer: async () => new ArrayBuffer(0)});
+  await settled();
+  await import('./kerf.js');
+  await settled();
   assert.deepEqual(shown(), ['not started', why]);
   for (const hash of ['#scene=nosuch', '#scene=touch']) {
     location.hash = hash;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tab's servo says where its module does not come or may not run: a plain sentence, never the engine's words.
+// How the tab's servo begins, and what is said where its module does not come or may not run: a plain sentence, never the engine's words.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
@@ -9,21 +9,57 @@ const bytesOf = bytes => async () => ({ok: true, arrayBuffer: async () => bytes.
 const {compile} = WebAssembly;
 let count = 0;
 
-/** What a new worker posts. */
-async function begun({fetch, compiles = compile}) {
-  const posted = [];
-  give('onmessage', null);
-  give('postMessage', message => posted.push(message));
+const otherType = async answer => {
+  await answer;
+  throw new TypeError('Incorrect response MIME type');
+};
+/** A page that begins: how its module comes, by the stream first. */
+async function begin({fetch, compiles = compile, streams = otherType}) {
+  give('Worker', class extends EventTarget {});
   give('fetch', fetch);
-  give('setTimeout', () => {});
-  WebAssembly.compile = compiles;
-  await import(`./worker.js?${++count}`);
-  while (!posted.length) await new Promise(done => setImmediate(done));
-  return posted;
+  Object.assign(WebAssembly, {compile: compiles, compileStreaming: streams});
+  return import(`./servo.js?${++count}`);
 }
-const failed = async how => (await begun(how))[0].failed;
+const failed = async how => (await begin(how)).compiled.then(() => 'it came', problem => problem.message);
 
-test('a sound module is ready', async () => assert.deepEqual(await begun({fetch: bytesOf(kSound)}), [{ready: true}]));
+test('a sound module comes by its stream, and by its bytes from a server that gives it no type of its own', async () => {
+  const asked = [];
+  const sound = async url => { asked.push(String(url)); return bytesOf(kSound)(); };
+  const {compiled} = await begin({fetch: sound, streams: async answer => { await answer; return 'by the stream'; }});
+  assert.equal(await compiled, 'by the stream');
+  assert.equal(asked.length, 1);
+  assert.match(asked[0], /kerf\.wasm$/);
+  assert.ok(await (await begin({fetch: sound})).compiled instanceof WebAssembly.Module);
+  const old = await begin({fetch: sound, streams: undefined});
+  assert.ok(await old.compiled instanceof WebAssembly.Module);
+});
+
+test('an error of the worker before the page listens is not lost', async () => {
+  const {worker, broken} = await begin({fetch: bytesOf(kSound)});
+  worker.dispatchEvent(Object.assign(new Event('error'), {message: 'blocked'}));
+  assert.equal((await broken).message, 'blocked');
+});
+
+test('a browser without workers: why, and nothing is begun', async () => {
+  const here = globalThis.Worker;
+  give('Worker', undefined);
+  const {lack, worker} = await import(`./servo.js?${++count}`);
+  give('Worker', here);
+  assert.match(lack, /no workers/);
+  assert.equal(worker, null);
+});
+
+test('the worker is ready once it has the module, and not before', async () => {
+  const posted = [];
+  give('postMessage', message => posted.push(message));
+  give('setTimeout', () => {});
+  give('onmessage', null);
+  await import('./worker.js');
+  onmessage({data: {close: true}});
+  assert.deepEqual(posted, []);
+  onmessage({data: {module: await compile(kSound)}});
+  assert.deepEqual(posted, [{ready: true}]);
+});
 
 test('a module that does not come: the network, a status, half of it, a page in its place', async () => {
   const offline = async () => { throw new TypeError('Failed to fetch'); };

@@ -13,11 +13,18 @@ const document = openPage(fs.readFileSync('index.html', 'utf8'));
 const element = id => document.getElementById(id);
 const give = (name, value) => Object.defineProperty(globalThis, name, {value, configurable: true, writable: true});
 const sent = [];
-give('Worker', class {
-  constructor() { globalThis.worker = this; }
+WebAssembly.compileStreaming = async () => 'the module';
+give('Worker', class extends EventTarget {
+  constructor() {
+    super();
+    globalThis.worker = this;
+  }
   postMessage(message) { sent.push(message); }
 });
-give('fetch', async () => { throw new TypeError('Failed to fetch'); });  // the network is gone: scenes are here
+// The module comes, then the network is gone: scenes are here.
+give('fetch', async url => {
+  if (!String(url).endsWith('kerf.wasm')) throw new TypeError('Failed to fetch');
+});
 vm.runInThisContext(fs.readFileSync('start.js', 'utf8'));
 give('matchMedia', () => ({matches: false}));
 
@@ -182,7 +189,8 @@ test('a scene that fails says why in place of the picture, until the next one be
   assert.deepEqual(shown(), ['loading the recording', false, 'loading the recording', '']);
 });
 
-test('a servo that ends in a run is told as that', () => {
-  globalThis.worker.onerror({message: 'Uncaught x'});
+test('a servo that ends in a run is told as that', async () => {
+  globalThis.worker.dispatchEvent(Object.assign(new Event('error'), {message: 'Uncaught x'}));
+  await settled();
   assert.match(element('missing').textContent, /^the servo of this tab has ended \(Uncaught x\); load the page again$/);
 });
