@@ -2,6 +2,7 @@
 #include "kerf/hand.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "hil/script/fault_script.hpp"
 #include "hil/script/faulty_device.hpp"
 #include "hil/script/hand_script_file.hpp"
+#include "shared/text/text.hpp"
 #include "shared/wire/emulator_link.hpp"
 
 namespace kerf {
@@ -43,6 +45,17 @@ int rate_of(const LoadedScene& scene) {
               ": an emulated device in lock-step has rates that divide 8000, such as 4000");
 }
 
+/// A scale that was measured on a unit gives the emulated motors another force.
+void require_emulated_motors(const DeviceSettings& device) {
+  const std::array<double, 3> emulated = torque_scale_in_text(device.personality);
+  if (device.torque_scale == emulated) return;
+  const auto text = [](const std::array<double, 3>& scale) {
+    return number_text(scale[0]) + ", " + number_text(scale[1]) + ", " + number_text(scale[2]);
+  };
+  throw Error("device.torque_scale = [" + text(device.torque_scale.value_or(emulated)) +
+              "]: the emulated motors have [" + text(emulated) + "]; leave it out");
+}
+
 }  // namespace
 
 struct Hand::Parts {
@@ -55,6 +68,23 @@ struct Hand::Parts {
         port(faulty, device.personality, rate_of(scene)),
         driver(make_driver(device.personality, port, device.encoder_sign, rate_of(scene))) {
     driver->start();
+  }
+
+  /// Without `script`: that of the scene.
+  static std::unique_ptr<Parts> of(const Scene& scene,
+                                   const std::optional<std::filesystem::path>& script,
+                                   const std::filesystem::path& faults, std::size_t arm) {
+    const LoadedScene& loaded = scene.loaded().scene;
+    if (arm >= scene.arms()) {
+      throw Error("arm " + std::to_string(arm) + ": the scene has " + std::to_string(scene.arms()) +
+                  "; they count from 0");
+    }
+    require_emulated_motors(device_of(loaded, arm));
+    if (arm == 0) {
+      return std::make_unique<Parts>(loaded, script.value_or(loaded.hand_script), faults);
+    }
+    return std::make_unique<Parts>(second_arm_of(loaded),
+                                   script.value_or(loaded.second->hand_script), faults);
   }
 
   DeviceReport next(const TickRecord& last) noexcept {
@@ -70,17 +100,11 @@ struct Hand::Parts {
   std::unique_ptr<DeviceDriver> driver;
 };
 
+Hand::Hand(const Scene& scene, std::size_t arm)
+    : parts_(or_error([&] { return Parts::of(scene, std::nullopt, {}, arm); })) {}
 Hand::Hand(const Scene& scene, const std::filesystem::path& script,
            const std::filesystem::path& faults, std::size_t arm)
-    : parts_(or_error([&] {
-        const LoadedScene& loaded = scene.loaded().scene;
-        if (arm == 0) return std::make_unique<Parts>(loaded, script, faults);
-        if (arm < scene.arms()) {
-          return std::make_unique<Parts>(second_arm_of(loaded), script, faults);
-        }
-        throw Error("arm " + std::to_string(arm) + ": the scene has " +
-                    std::to_string(scene.arms()) + "; they count from 0");
-      })) {}
+    : parts_(or_error([&] { return Parts::of(scene, script, faults, arm); })) {}
 Hand::~Hand() = default;
 Hand::Hand(Hand&&) noexcept = default;
 Hand& Hand::operator=(Hand&&) noexcept = default;
@@ -90,6 +114,7 @@ DeviceReport Hand::next(const TickRecord& last) noexcept {
 }
 
 void Hand::lead(const std::array<double, 3>& tip_mm, bool button) noexcept {
+  if (!std::ranges::all_of(tip_mm, [](double mm) { return std::isfinite(mm); })) return;
   const auto axis = [&](std::size_t i) {
     return (tip_mm[i] - parts_->device.offset_mm[i]) / parts_->device.workspace_scale;
   };

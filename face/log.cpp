@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <exception>
 #include <utility>
 
 #include "controller/loop/publisher.hpp"
@@ -29,8 +30,9 @@ namespace {
 /// What a recorder knows of a run: the constant part of its segment.
 SegmentInfo info_of(const Scene::Loaded& loaded) {
   const std::string json = json_with_source(Json::parse(loaded.json), loaded.scene, loaded.source);
-  const SegmentWriter writer =
-      SegmentWriter::create(segment_spec(loaded.scene, json, loaded.config_hash), true);
+  SegmentSpec spec = segment_spec(loaded.scene, json, loaded.config_hash);
+  spec.build_id = std::string("libkerf ") + KERF_VERSION;
+  const SegmentWriter writer = SegmentWriter::create(spec, true);
   return SegmentReader::map(writer.fd()).info();
 }
 
@@ -44,8 +46,8 @@ std::filesystem::path new_recording(const std::filesystem::path& folder) {
 
 struct LogWriter::Parts {
   Parts(const std::filesystem::path& where, const Scene& scene)
-      : folder(new_recording(where)),
-        info(info_of(scene.loaded())),
+      : info(info_of(scene.loaded())),
+        folder(new_recording(where)),
         logs(folder, Beginning{}, info) {
     write_new_file(folder / kSceneName, info.scene_json);
     for (const SceneVolume& volume : scene.loaded().scene.volumes) {
@@ -55,46 +57,48 @@ struct LogWriter::Parts {
     }
     write_manifest(folder, info, {}, 0, kStillRunning);
   }
+  ~Parts() {
+    try {
+      close();
+    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): who asks calls `close`
+    }
+  }
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
 
   void add(std::span<const TickRecord> arms) {
+    const auto refuse = [&](const std::string& why) { throw Error(folder.string() + ": " + why); };
+    if (closed) refuse("is closed; write another recording");
     if (arms.size() != info.arms) {
-      throw Error(folder.string() + ": a tick of " + std::to_string(arms.size()) +
-                  " arms, and the scene has " + std::to_string(info.arms) + "; add all of them");
+      refuse("a tick of " + std::to_string(arms.size()) + " arms, and the scene has " +
+             std::to_string(info.arms) + "; add all of them");
     }
     const std::uint64_t next = logs.rows() + 1;
     if (arms.front().tick != next) {
-      throw Error(folder.string() + ": tick " + std::to_string(arms.front().tick) + ", and tick " +
-                  std::to_string(next) +
-                  " comes next; begin before the first step, add each tick once");
+      refuse("tick " + std::to_string(arms.front().tick) + ", and tick " + std::to_string(next) +
+             " comes next; add each tick of one run once, from the first on");
     }
     if (arms.size() > 1) logs.append_second(arms[1]);
     logs.append(arms[0]);
   }
 
   void close() {
-    if (std::exchange(closed, true)) return;
-    constexpr std::string_view kEnd = "clean end";
+    if (closed) return;
     logs.flush();
     logs.sync();
-    write_manifest(folder, info, {}, logs.rows(), kEnd, logs.summaries({}, kEnd));
+    write_manifest(folder, info, {}, logs.rows(), kCleanEnd, logs.summaries({}, kCleanEnd));
+    closed = true;
   }
 
-  std::filesystem::path folder;
   SegmentInfo info;
+  std::filesystem::path folder;
   ArmLogs logs;
   bool closed = false;
 };
 
 LogWriter::LogWriter(const std::filesystem::path& folder, const Scene& scene)
     : parts_(or_error([&] { return std::make_unique<Parts>(folder, scene); })) {}
-
-LogWriter::~LogWriter() {
-  if (!parts_) return;
-  try {
-    parts_->close();
-  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): who wants to know calls close
-  }
-}
+LogWriter::~LogWriter() = default;
 LogWriter::LogWriter(LogWriter&&) noexcept = default;
 LogWriter& LogWriter::operator=(LogWriter&&) noexcept = default;
 
@@ -155,11 +159,27 @@ std::size_t Log::read(std::uint64_t first, std::span<TickRecord> rows, std::size
 }
 
 void Log::for_each(const std::function<void(const TickRecord&)>& visit, std::size_t arm) {
-  or_error([&] { parts_->log(arm).for_each(visit); });
+  if (!visit) return;
+  std::vector<TickRecord> rows(TickLogReader::kChunkRows);
+  for (std::uint64_t row = 0; row < parts_->log(arm).rows();) {
+    const std::size_t count = read(row, rows, arm);
+    if (count == 0) return;
+    for (const TickRecord& record : std::span(rows).first(count)) visit(record);
+    row += count;
+  }
 }
 
 ReplayOutcome Log::replay(const Settings& settings, const Visit& visit) const {
-  return or_error([&] {
+  std::exception_ptr of_visitor;
+  const auto show = [&](const TickRecord& recorded, const TickRecord& replayed) {
+    try {
+      if (visit) visit(recorded, replayed);
+    } catch (...) {
+      of_visitor = std::current_exception();
+    }
+    return of_visitor == nullptr;
+  };
+  ReplayOutcome outcome = or_error([&] {
     RecordedTicks log(parts_->folder, parts_->manifest.arms);
     RecordedRun run = load_run(parts_->folder, {.settings = settings}, kernels_named({}));
     step_earlier_ticks(run, parts_->folder);
@@ -167,24 +187,26 @@ ReplayOutcome Log::replay(const Settings& settings, const Visit& visit) const {
     const std::atomic<bool> stop{false};
     const ReplayResult result = replay_ticks(
         run, log, UINT64_MAX, stop, [&](const ArmRecords& recorded, const ArmRecords& replayed) {
-          if (visit) visit(recorded[0], replayed[0]);
+          if (!show(recorded[0], replayed[0])) return false;
           if (!first) first = first_difference(recorded, replayed, run.servo->arms());
           return !first || !settings.empty();
         });
-    ReplayOutcome outcome{.ticks = result.ticks,
-                          .output_hash = result.output_hash[0],
-                          .difference = {},
-                          .cut_short = result.cut_short};
+    ReplayOutcome found{.ticks = result.ticks,
+                        .output_hash = result.output_hash[0],
+                        .difference = {},
+                        .cut_short = result.cut_short};
     if (first) {
-      outcome.difference = {.tick = first->tick,
-                            .arm = first->arm,
-                            .stage = std::string(first->at.stage),
-                            .field = first->at.field,
-                            .recorded = first->at.recorded,
-                            .replayed = first->at.replayed};
+      found.difference = {.tick = first->tick,
+                          .arm = first->arm,
+                          .stage = std::string(first->at.stage),
+                          .field = first->at.field,
+                          .recorded = first->at.recorded,
+                          .replayed = first->at.replayed};
     }
-    return outcome;
+    return found;
   });
+  if (of_visitor) std::rethrow_exception(of_visitor);
+  return outcome;
 }
 
 }  // namespace kerf

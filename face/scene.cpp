@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 #include <utility>
 
 #include "controller/load/load_scene.hpp"
@@ -53,6 +52,19 @@ Scene scene_of(SceneSource source) {
   return scene_of(std::move(scene), std::move(source));
 }
 
+/// What says how a file is read says nothing of memory.
+void refuse_keys_of_files(const SceneSpec& written) {
+  const VolumeSpec& first = written.volumes.front();
+  const char* const key = first.window                ? "window"
+                          : first.spacing_mm          ? "spacing_mm"
+                          : first.override_spacing_mm ? "override_spacing_mm"
+                          : is_phantom(first)         ? "file = \"phantom\""
+                                                      : nullptr;
+  if (key == nullptr) return;
+  throw Error("volume 1: " + std::string(key) +
+              " is of files, and these voxels come from memory; leave it out");
+}
+
 VolumeImage image_of(const Voxels& voxels) {
   VolumeImage image;
   const auto& [nx, ny, nz] = voxels.size;
@@ -85,7 +97,7 @@ Scene Scene::load(const std::filesystem::path& file, const Settings& settings) {
 Scene Scene::parse(std::string_view text, const std::filesystem::path& folder,
                    const Settings& settings) {
   return or_error([&] {
-    return scene_of(SceneSource{std::filesystem::absolute(folder) / "scene.toml", std::string(text),
+    return scene_of(SceneSource{std::filesystem::absolute(folder / "scene.toml"), std::string(text),
                                 overrides_of(settings)});
   });
 }
@@ -94,9 +106,10 @@ Scene Scene::of_voxels(const Voxels& first, std::string_view text, const Setting
   return or_error([&] {
     SceneSource source{std::filesystem::absolute("scene.toml"), std::string(text),
                        overrides_of(settings)};
-    take_emulated_motors(
-        parse_scene(source.text, source.path, scene_keys(), source.overrides.settings),
-        source.overrides);
+    const SceneSpec written =
+        parse_scene(source.text, source.path, scene_keys(), source.overrides.settings);
+    refuse_keys_of_files(written);
+    take_emulated_motors(written, source.overrides);
     LoadedScene scene = load_scene(source.path, source.text, image_of(first), source.overrides);
     return scene_of(std::move(scene), std::move(source));
   });

@@ -113,19 +113,22 @@ VoxelView Segment::volume(std::size_t number, std::size_t* changed_bricks) {
   const SegmentVolumeInfo& info = parts_->reader().info().volumes[number];
   return {.size = {info.grid.nx, info.grid.ny, info.grid.nz},
           .spacing_mm = info.spacing_mm,
+          .origin_mm = info.origin_mm,
+          .orientation = {info.orientation[0], info.orientation[1], info.orientation[2],
+                          info.orientation[3]},
           .density = snapshot.density};
 }
 
-bool Segment::send(const ServoCommand& command) {
+std::uint32_t Segment::send(const ServoCommand& command) {
   const auto kind = kind_of(command.kind);
-  if (!kind) return false;
+  if (!kind) return 0;
   return or_error([&] {
     Command asked;
     asked.kind = *kind;
     asked.argument = command.argument;
     asked.arm = command.arm;
     const Reply reply = parts_->connection.send(asked);
-    return reply.status == ReplyStatus::accepted;
+    return reply.status == ReplyStatus::accepted ? reply.index : 0;
   });
 }
 

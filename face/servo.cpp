@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <utility>
-#include <vector>
 
 #include "controller/plan/compile.hpp"
 #include "controller/tick/tick_record.hpp"
@@ -33,12 +32,16 @@ struct Servo::Parts {
         (!fade_in && given.missed > 0)) {
       return false;
     }
-    if (missed && (command.argument == 0 || command.argument > kMostMissed)) return false;
     const bool of_person = !missed && !fade_in;
+    const bool has_argument = missed || command.kind == Kind::select_tool;
+    if (missed && command.argument == 0) return false;
+    if (!has_argument && command.argument > (command.kind == Kind::hold ? 1U : 0U)) return false;
     if (of_person && given.command.kind != Kind::none) return false;
-    if (!servo->apply(command)) return false;
+    ServoCommand bounded = command;
+    if (missed) bounded.argument = std::min(command.argument, kMostMissed);
+    if (!servo->apply(bounded)) return false;
     if (of_person) given.command = command;
-    if (missed) given.missed = command.argument;
+    if (missed) given.missed = bounded.argument;
     if (fade_in) given.fade_in = true;
     return true;
   }
@@ -107,6 +110,8 @@ VoxelView Servo::voxels(std::size_t volume) const noexcept {
   const VoxelGrid& grid = volumes[volume].image.grid;
   return {.size = {grid.nx, grid.ny, grid.nz},
           .spacing_mm = volumes[volume].image.spacing_mm,
+          .origin_mm = volumes[volume].pose.position_mm,
+          .orientation = volumes[volume].pose.orientation,
           .density = parts_->servo->density(volume)};
 }
 

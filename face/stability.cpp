@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <thread>
 #include <utility>
 
@@ -17,6 +18,25 @@
 namespace kerf {
 namespace {
 
+/// `name` is within these limits, both allowed; NaN is not.
+void require_within(const char* name, double value, double least, double most) {
+  if (value >= least && value <= most) return;
+  throw Error(std::string(name) + " = " + number_text(value) + ": give one from " +
+              number_text(least) + " to " + number_text(most));
+}
+
+/// The limits of the options of `kerf lab zwidth`.
+void require_sound(const WallRun& run) {
+  if (const std::string problem = problem_in(run.loop); !problem.empty()) throw Error(problem);
+  require_within("period_s", run.loop.period_s, 1.0 / 32000, 1.0 / 250);
+  require_within("mass_kg", run.loop.mass_kg, 0.001, 100);
+  require_within("stiffness_n_per_mm", run.stiffness_n_per_mm, 1e-4, 127);
+  require_within("damping_ns_per_mm", run.damping_ns_per_mm, 0, 2);
+  require_within("push_n", run.push_n, 0, 100);
+  require_within("hit_mm_per_s", run.hit_mm_per_s, 0, 10'000);
+  require_within("seconds", run.seconds, 0.001, zwidth::kLongestLimitS);
+}
+
 zwidth::LoopCase case_of(const WallRun& run) {
   using zwidth::Law;
   zwidth::LoopCase subject;
@@ -26,25 +46,23 @@ zwidth::LoopCase case_of(const WallRun& run) {
   subject.estimator.name = run.estimator;
   subject.numeric = run.fixed_point ? NumericKind::fixed : NumericKind::float64;
   subject.limits = run.limits;
-  if (run.law == "coupling" || run.law == "linear" || run.law == "two_sided") {
-    subject.law = run.law == "coupling" ? Law::coupling
-                  : run.law == "linear" ? Law::linear
-                                        : Law::two_sided;
+  if (run.law == "coupling") {
+    subject.law = Law::coupling;
+  } else if (run.law == "linear") {
+    subject.law = Law::linear;
+  } else if (run.law == "two_sided") {
+    subject.law = Law::two_sided;
   } else {
     subject.law = Law::own;
     subject.force_law.name = run.law;
-    static_cast<void>(find_law(LawKind::force, run.law));
   }
   return subject;
 }
 
-void require(bool met, const std::string& name, double value, const char* way_out) {
-  if (met) return;
-  throw Error(name + " = " + number_text(value) + ": " + way_out);
-}
-
 zwidth::MapSpec spec_of(std::string_view stiffness, const std::vector<MapAxis>& axes,
                         const MapOptions& options) {
+  require_within("seconds", options.seconds, 0.001, zwidth::kLongestLimitS);
+  require_within("seeds", static_cast<double>(options.seeds), 1, zwidth::kMostSeeds);
   zwidth::MapSpec spec;
   spec.stiffness_n_per_mm = zwidth::stiffness_values(std::string(stiffness));
   spec.seconds = options.seconds;
@@ -53,6 +71,7 @@ zwidth::MapSpec spec_of(std::string_view stiffness, const std::vector<MapAxis>& 
   for (const MapAxis& axis : axes) {
     const std::size_t number = zwidth::axis_named("axis", axis.name);
     if (number == zwidth::kAxisCount) throw Error("axis stiffness: it is the first argument");
+    if (!spec.table[number].empty()) throw Error("axis " + axis.name + ": given twice");
     spec.table[number] = zwidth::axis_values(static_cast<zwidth::AxisId>(number), axis.values);
   }
   return spec;
@@ -60,24 +79,49 @@ zwidth::MapSpec spec_of(std::string_view stiffness, const std::vector<MapAxis>& 
 
 }  // namespace
 
+std::string problem_in(const SampledLoop& loop) {
+  const std::pair<const char*, double> positive[] = {{"mass_kg", loop.mass_kg},
+                                                     {"period_s", loop.period_s}};
+  const std::pair<const char*, double> not_negative[] = {
+      {"viscous_ns_per_mm", loop.viscous_ns_per_mm},
+      {"delay_s", loop.delay_s},
+      {"velocity_filter_s", loop.velocity_filter_s},
+      {"hand.mass_kg", loop.hand.mass_kg},
+      {"hand.damping_ns_per_mm", loop.hand.damping_ns_per_mm},
+      {"hand.stiffness_n_per_mm", loop.hand.stiffness_n_per_mm},
+      {"coulomb_n", loop.coulomb_n},
+      {"quantum_mm", loop.quantum_mm}};
+  for (const auto& [name, value] : positive) {
+    if (std::isfinite(value) && value > 0) continue;
+    return std::string(name) + " = " + number_text(value) + ": give a positive one";
+  }
+  for (const auto& [name, value] : not_negative) {
+    if (std::isfinite(value) && value >= 0) continue;
+    return std::string(name) + " = " + number_text(value) + ": give 0 or a positive one";
+  }
+  return {};
+}
+
 SampledLoop device_loop(std::string_view device, double rate_hz) {
   const auto found = std::ranges::find(kPersonalityWords, device);
   if (found == kPersonalityWords.end()) {
     throw Error("device: " + one_line(device) + unknown_word(device, kPersonalityWords));
   }
-  require(rate_hz > 0, "rate_hz", rate_hz, "give a positive one");
+  require_within("rate_hz", rate_hz, 1, 1e6);
   return unheld_loop(static_cast<Personality>(found - kPersonalityWords.begin()), rate_hz);
 }
 
 LimitCycle run_on_wall(const WallRun& run) {
   return or_error([&] {
-    require(run.loop.mass_kg > 0, "mass_kg", run.loop.mass_kg, "give a positive one");
-    require(run.loop.period_s > 0, "period_s", run.loop.period_s, "give a positive one");
-    require(run.seconds > 0 && run.seconds <= zwidth::kLongestLimitS, "seconds", run.seconds,
-            "give one above 0, up to 600");
+    require_sound(run);
     zwidth::StepCounter ticks;
-    return zwidth::hit_one_axis(case_of(run), run.stiffness_n_per_mm, run.hit_mm_per_s, run.seconds,
-                                run.seed, ticks);
+    try {
+      return zwidth::hit_one_axis(case_of(run), run.stiffness_n_per_mm, run.hit_mm_per_s,
+                                  run.seconds, run.seed, ticks);
+    } catch (const LawError& error) {
+      throw Error("law " + one_line(run.law) + " (or coupling, linear, two_sided), estimator " +
+                  one_line(run.estimator) + ":" + error.what());
+    }
   });
 }
 

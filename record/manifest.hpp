@@ -41,6 +41,7 @@ inline constexpr std::string_view kSceneName = "scene.json";
 /// of the files of a log that was split each second for 20 days.
 inline constexpr std::uintmax_t kMostManifestBytes = std::uintmax_t{64} << 20;
 inline constexpr std::string_view kStillRunning = "running";
+inline constexpr std::string_view kCleanEnd = "clean end";
 inline constexpr std::string_view kFault = "fault";     ///< the run did not end as it was asked to
 inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 /// The manifest was made anew, and nothing says how the run ended: its recorder may have been

@@ -99,7 +99,7 @@ bool has_ended(const SegmentConnection& connection) noexcept {
 
 std::string_view end_reason(const SegmentReader& reader, bool stopped) noexcept {
   const Lifecycle lifecycle = reader.lifecycle();
-  if (lifecycle == Lifecycle::clean_end) return "clean end";
+  if (lifecycle == Lifecycle::clean_end) return kCleanEnd;
   if (lifecycle == Lifecycle::fault) return kFault;
   return stopped ? "stopped" : "controller gone";
 }

@@ -17,15 +17,6 @@ DirtyCause cause_of(const ServoOutput& output) noexcept {
 
 }  // namespace
 
-void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) noexcept {
-  const auto publish_box = [&](std::size_t v, const VoxelBox& box) {
-    const std::uint64_t steps = output.removed_by_volume[v] + output.returned_by_volume[v];
-    return segment_.publish_box(v, servo_.density(v), box, static_cast<std::uint32_t>(steps),
-                                cause_of(output));
-  };
-  put_changes(output, publish_box, removal_hash_, record);
-}
-
 SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std::uint64_t hash) {
   SegmentSpec spec;
   spec.scene_json = json;
@@ -58,10 +49,14 @@ void Publisher::publish(Tick tick, std::span<const DeviceReport> reports,
   }
   segment_.begin_tick(tick);
   std::array<TickRecord, kMaxArms> records;
+  const auto publish_box = [&](const ServoOutput& output, std::size_t v, const VoxelBox& box) {
+    const std::uint64_t steps = output.removed_by_volume[v] + output.returned_by_volume[v];
+    return segment_.publish_box(v, servo_.density(v), box, static_cast<std::uint32_t>(steps),
+                                cause_of(output));
+  };
+  make_records(servo_, reports, commands, outputs, removal_hash_, records, publish_box);
   for (std::size_t a = 0; a < outputs.size(); ++a) {
     TickRecord& record = records[a];
-    record = record_of(reports[a], commands_for(a, commands), outputs[a]);
-    publish_volumes(outputs[a], record);
     record.tick = tick;
     record.start_ns = static_cast<std::uint64_t>(timing.start_ns);
     record.period_error_ns = saturate_i32(timing.late_ns);
@@ -69,7 +64,6 @@ void Publisher::publish(Tick tick, std::span<const DeviceReport> reports,
     record.missed_deadlines = static_cast<std::uint32_t>(timing.missed_deadlines);
     record.lost_packets = static_cast<std::uint32_t>(timing.lost_packets[a]);
     record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets[a]);
-    record.penetration_mm = static_cast<float>(servo_.penetration_mm(a));
   }
   // The first arm last: a reader that sees its record finds those of the others.
   for (std::size_t a = outputs.size(); a-- > 0;) segment_.publish_state(records[a], a);

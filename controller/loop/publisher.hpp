@@ -45,8 +45,6 @@ class Publisher {
                std::span<const ServoOutput> outputs, const TickTiming& timing) noexcept;
 
  private:
-  void publish_volumes(const ServoOutput& output, TickRecord& record) noexcept;
-
   SegmentWriter& segment_;
   const AnyServo& servo_;
   bool held_ = false;                         ///< as published

@@ -193,14 +193,10 @@ TickCommands commands_of(std::span<const TickRecord> records) noexcept {
 void make_records(const AnyServo& servo, std::span<const DeviceReport> reports,
                   const TickCommands& commands, std::span<const ServoOutput> outputs,
                   std::uint64_t& chain, std::span<TickRecord> records) noexcept {
-  const auto hash_of = [&](std::size_t v, const VoxelBox& box) {
-    return changed_box_hash(BrickGrid::of(servo.grid(v)), servo.density(v), box);
-  };
-  for (std::size_t arm = 0; arm < outputs.size(); ++arm) {
-    records[arm] = record_of(reports[arm], commands_for(arm, commands), outputs[arm]);
-    put_changes(outputs[arm], hash_of, chain, records[arm]);
-    records[arm].penetration_mm = static_cast<float>(servo.penetration_mm(arm));
-  }
+  make_records(servo, reports, commands, outputs, chain, records,
+               [&](const ServoOutput& /*output*/, std::size_t v, const VoxelBox& box) {
+                 return changed_box_hash(BrickGrid::of(servo.grid(v)), servo.density(v), box);
+               });
 }
 
 }  // namespace kerf

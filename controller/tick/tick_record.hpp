@@ -53,7 +53,7 @@ inline bool apply_commands(const TickCommands& commands, AnyServo& servo) noexce
 }
 
 /// The record of a tick of an arm, as far as report, commands and output determine it: all but
-/// times, losses, hashes of volumes and penetration.
+/// number, times, losses, changed boxes with their hashes, penetration and checksum.
 [[nodiscard]] TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
                                    const ServoOutput& output) noexcept;
 /// The report in a record, and what `record_of` was given as commands.
@@ -86,13 +86,29 @@ void put_changes(const ServoOutput& output, const HashOf& hash_of, std::uint64_t
   record.volume_hash = chain;
 }
 
-/// The records of a tick of all arms, after its step: all but times and losses. `chain`: of the
-/// volumes' hashes so far, stepped.
+/// The records of a tick of all arms, after its step: all but number, times, losses and checksum.
+/// `chain`: of the volumes' hashes so far, stepped. `hash_of` an output, a volume and its box gives
+/// the hash of the densities there.
+template <class HashOf>
+void make_records(const AnyServo& servo, std::span<const DeviceReport> reports,
+                  const TickCommands& commands, std::span<const ServoOutput> outputs,
+                  std::uint64_t& chain, std::span<TickRecord> records,
+                  const HashOf& hash_of) noexcept {
+  for (std::size_t arm = 0; arm < outputs.size(); ++arm) {
+    const ServoOutput& output = outputs[arm];
+    records[arm] = record_of(reports[arm], commands_for(arm, commands), output);
+    put_changes(
+        output, [&](std::size_t v, const VoxelBox& box) { return hash_of(output, v, box); }, chain,
+        records[arm]);
+    records[arm].penetration_mm = static_cast<float>(servo.penetration_mm(arm));
+  }
+}
+/// The same, for a servo whose volumes nobody else publishes.
 void make_records(const AnyServo& servo, std::span<const DeviceReport> reports,
                   const TickCommands& commands, std::span<const ServoOutput> outputs,
                   std::uint64_t& chain, std::span<TickRecord> records) noexcept;
 
-/// Hash of the first `count` volumes as they are now: `volume_hash` of a report. While no step
+/// Hash of the first `count` volumes as they are now: `volume_hash` of report.json. While no step
 /// runs.
 [[nodiscard]] std::uint64_t hash_of_volumes(const AnyServo& servo, std::size_t count) noexcept;
 

@@ -14,28 +14,32 @@ namespace kerf {
 /// The scene's device, emulated down to its packets, and the hand that holds it, in lock-step with
 /// a servo: the run of `./kerf demo --virtual` to the bit.
 ///
-///     kerf::Hand hand(scene, "press.toml");
+///     kerf::Hand hand(scene, "touch.toml");
 ///     servo.step(hand.next(servo.last()));
 ///
 /// The hand rests until the device is calibrated, reaches for the start of its script, goes through
 /// it and stays at its end (docs/script-keys.md). One thread.
 class Hand {
  public:
-  /// `script`: TOML of a hand; empty: it only reaches for its start, and is led from there.
-  /// `faults`: TOML of faults of the device (hil/faults); empty: none. `arm`: whose device it is.
-  /// Throws Error.
-  explicit Hand(const Scene& scene, const std::filesystem::path& script = {},
-                const std::filesystem::path& faults = {}, std::size_t arm = 0);
+  /// With the scene's own [[hand]]; if that names no script, the hand reaches for its start and is
+  /// led from there. `arm`: whose device it is. Throws Error, also for a rate that does not divide
+  /// 8000 Hz, and for a `device.torque_scale` that is not that of the emulated motors.
+  explicit Hand(const Scene& scene, std::size_t arm = 0);
+  /// With another script, TOML of a hand (empty: none), and with faults of the device, TOML as in
+  /// hil/faults (empty: none).
+  Hand(const Scene& scene, const std::filesystem::path& script,
+       const std::filesystem::path& faults = {}, std::size_t arm = 0);
   ~Hand();
   Hand(Hand&&) noexcept;
   Hand& operator=(Hand&&) noexcept;
 
-  /// The device gets the motor counts of the last tick, which take it a period further, and its
-  /// newest report comes. `last` is that of its own arm; before the first tick nothing is sent.
+  /// Sends the motor counts of `last`, the last tick of its own arm, to the device, which moves on
+  /// by one period; returns its newest report. Before the first tick nothing is sent.
   [[nodiscard]] DeviceReport next(const TickRecord& last) noexcept;
 
   /// Leads a hand whose script has ended: where its tip shall be, in scene mm, as far as a hand can
-  /// follow. It lets go after a quarter of a second without a new target.
+  /// follow. It lets go after a quarter of a second without a new target. Ignored before the end of
+  /// the script, and if a number is not finite.
   void lead(const std::array<double, 3>& tip_mm, bool button = false) noexcept;
 
   /// True if it can be led: the script has ended.

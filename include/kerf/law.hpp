@@ -24,7 +24,8 @@
 //     KERF_REGISTER_FORCE_LAW(Cubic)
 //
 // `step` runs in the servo's thread, in each tick that may send a force: no exception, lock, system
-// call, allocation or unbounded loop. A value that is not finite latches a fault, motors off.
+// call, allocation or unbounded loop. In double a value that is not finite latches a fault, motors
+// off; fixed point saturates.
 
 #include "controller/law/law.hpp"                    // inputs, settings, registration
 #include "controller/law/registry/law_registry.hpp"  // a law by its name, for tests

@@ -30,13 +30,18 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// One key of docs/scene-keys.md as `table.key=VALUE`, such as "force.stiffness_n_per_mm=0.6". It
-/// takes the place of what the file has.
+/// One key of docs/scene-keys.md each, as `table.key=VALUE`, where VALUE is TOML, such as
+/// "force.stiffness_n_per_mm=0.6" or "force.law=\"mine\"". It takes the place of what the file has.
 using Settings = std::vector<std::string>;
 
-/// Densities of a volume from memory, x fastest: 0 is air, 65535 is full.
+// An object that was moved from may only be assigned to, or destroyed: in all of these headers.
+
+/// Densities of a volume from memory, x fastest: 0 is air, 65535 is full. The scene treats them as
+/// those of a file: it crops them to the solid with a border of air, smooths noise, and turns the z
+/// axis up (world y), unless its [[volume]] has `crop = false`, `denoise = "none"` and an
+/// `orientation`. `VoxelView` says where the voxels of a servo lie.
 struct Voxels {
-  std::array<int, 3> size{};                        ///< voxels along x, y, z, up to 1024 each
+  std::array<int, 3> size{};  ///< along x, y, z: up to 1024 each, 512 Mi in all
   std::array<double, 3> spacing_mm{0.1, 0.1, 0.1};  ///< 1 nm to 1 m
   std::span<const std::uint16_t> density{};         ///< size[0] * size[1] * size[2] of them
 };
@@ -58,8 +63,9 @@ class Scene {
   [[nodiscard]] static Scene parse(std::string_view text, const std::filesystem::path& folder,
                                    const Settings& settings = {});
 
-  /// The same with these densities as the first [[volume]], whose `file` is not read then. Throws
-  /// Error.
+  /// The same with these densities as the first [[volume]]. Its `file` is a name for messages; what
+  /// says how a file is read (`window`, `spacing_mm`, `override_spacing_mm`, a phantom) is refused.
+  /// Throws Error.
   [[nodiscard]] static Scene of_voxels(const Voxels& first, std::string_view text,
                                        const Settings& settings = {});
 

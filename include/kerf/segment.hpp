@@ -48,8 +48,8 @@ class Segment {
   [[nodiscard]] std::optional<TickRecord> latest(std::size_t arm = 0) const noexcept;
   /// Ticks that were published so far. The last 4096 can be read.
   [[nodiscard]] std::uint64_t count() const noexcept;
-  /// Appends ticks number `from` to `count()` to `out`, oldest first. Returns how many of them were
-  /// overwritten before they were read.
+  /// Appends the records from number `from`, counted from 0, up to `count()` to `out`, oldest
+  /// first. Returns how many of them were overwritten before they were read.
   std::uint64_t since(std::uint64_t from, std::vector<TickRecord>& out, std::size_t arm = 0) const;
 
   /// Copies what has changed in a volume since the last call, into memory of this object. Returns
@@ -57,8 +57,10 @@ class Segment {
   VoxelView volume(std::size_t number, std::size_t* changed_bricks = nullptr);
 
   /// Asks the controller for a command, as a key in the window does; waits up to 2 s for its
-  /// answer, which says whether the servo will take it. Throws Error if there is none.
-  bool send(const ServoCommand& command);
+  /// answer. Returns the number that `last_command` has from the tick on that applied it, or 0:
+  /// refused, or a kind that a reader cannot ask for (`missed`, `fade_in`). What the servo itself
+  /// refuses, as an undo of nothing, has a number, too. Throws Error if there is no answer.
+  std::uint32_t send(const ServoCommand& command);
 
  private:
   struct Parts;

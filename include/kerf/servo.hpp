@@ -13,16 +13,19 @@
 
 namespace kerf {
 
-/// A volume as it is now; x fastest. Lives as long as its servo, and changes with its next step.
+/// A volume as it is now; x fastest. Lives as long as the object that it is of, and changes with
+/// its next step, or its next call for a volume.
 struct VoxelView {
   std::array<int, 3> size{};
   std::array<double, 3> spacing_mm{};
-  std::span<const std::uint16_t> density{};  ///< 0 is air, 65535 is full
+  std::array<double, 3> origin_mm{};  ///< world position of the middle of voxel (0, 0, 0)
+  std::array<double, 4> orientation{0, 0, 0, 1};  ///< quaternion x, y, z, w: voxel axes to world
+  std::span<const std::uint16_t> density{};       ///< 0 is air, 65535 is full
 };
 
 /// The servo of a scene without a device, a clock or a thread: reports and commands in, ticks out.
-/// A pure function of the scene and of what it is given: the same bits on every machine, in fixed
-/// point also with every instruction set.
+/// A pure function of the scene and of what it is given. In fixed point it has the same bits on
+/// every machine; in double, on machines with the same instruction set.
 ///
 ///     kerf::Servo servo(scene);
 ///     kerf::Hand hand(scene, "press.toml");
@@ -44,15 +47,17 @@ class Servo {
 
   /// One tick of a scene with one arm. Of a scene with two the second one has no report then.
   const TickRecord& step(const DeviceReport& report) noexcept;
-  /// One tick of all arms; a report that is missing counts as not fresh.
+  /// One tick of all arms; a report that is missing counts as not fresh, those beyond the arms are
+  /// ignored.
   std::span<const TickRecord> step(std::span<const DeviceReport> reports) noexcept;
-  /// The last tick of an arm; all zero before the first one, with the phase `off`.
+  /// The last tick of an arm, for a higher number that of the second; all zero before the first
+  /// one, with the phase `off`.
   [[nodiscard]] const TickRecord& last(std::size_t arm = 0) const noexcept;
 
-  /// Before the next step: a command of a person, `missed` ticks, `fade_in`; at most one of each
-  /// and in this order, since a log has room for so much a tick. Returns false, and changes
-  /// nothing, for another one, and for what the servo refuses: a tool that the scene lacks, an undo
-  /// of nothing.
+  /// Call it before a step: first at most one command of a person, then at most one `missed`, then
+  /// at most one `fade_in`, since a log has room for so much a tick. Returns false, and changes
+  /// nothing, for a second one, for one out of order, and for what the servo refuses: a tool that
+  /// the scene lacks, an undo of nothing.
   bool apply(const ServoCommand& command) noexcept;
 
   /// Volume number `volume` of the scene.
@@ -60,10 +65,12 @@ class Servo {
   /// Hash of all volumes as they are now: `volume_hash` of reports and replays.
   [[nodiscard]] std::uint64_t volume_hash() const noexcept;
 
-  /// All that one tick hands to the next, copied. Cheap to copy itself; any thread.
+  /// All that the servo carries from tick to tick, with commands that wait and the last ticks. A
+  /// copy of it shares it; any thread.
   class State;
   /// The state between two ticks, and back to it: of this servo, or another one of the same scene.
-  /// `restore` throws Error if the scene differs. Both allocate.
+  /// A Hand and a LogWriter do not go back with it. `restore` throws Error if the scene differs.
+  /// Both allocate.
   [[nodiscard]] State keep() const;
   void restore(const State& state);
 

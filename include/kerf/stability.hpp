@@ -54,6 +54,10 @@ struct SampledLoop {
 /// Longer delays are clamped to this one.
 inline constexpr double kMaxDelayPeriods = 64;
 
+/// What of a loop no device has, as "mass_kg = 0: give a positive one"; empty if nothing. The exact
+/// functions and bounds below mean something for loops without a problem alone; runs refuse others.
+[[nodiscard]] std::string problem_in(const SampledLoop& loop);
+
 /// The loop of a device ("omni", "falcon", "woodenhaptics", "inverse3", "touch", "omega") by the
 /// figures of docs/devices.md, without a hand: a light grip is the worst case. Throws Error for
 /// another name or a rate that is not positive.
@@ -131,7 +135,8 @@ struct LimitCycle {
   }
 };
 
-/// One run of a hand against a wall: it meets it at a speed and goes on pushing.
+/// One run of a hand against a wall: it meets it at a speed and goes on pushing. In a map, seed s
+/// and hit number h (0, 50, 200 mm/s) have `seed` = s 2^32 + h.
 struct WallRun {
   SampledLoop loop;
   double stiffness_n_per_mm = 1;
@@ -179,8 +184,9 @@ struct MapOptions {
   std::size_t threads = 0;  ///< 0: one for each core; the map is the same
 };
 
-/// The map of `kerf lab zwidth`: `stiffness` is "0.05:50:40", even in the ratio, or a list in N/mm.
-/// Takes seconds to hours: docs/stability.md. Throws Error for an axis or a value that cannot be.
+/// The map of `kerf lab zwidth`, whose options are the axes: `kerf lab zwidth --help` lists names
+/// and values. `stiffness` is "0.05:50:40", even in the ratio, or a list in N/mm. Takes seconds to
+/// hours: docs/stability.md. Throws Error for an axis or a value that cannot be.
 [[nodiscard]] StabilityMap stability_map(std::string_view stiffness,
                                          const std::vector<MapAxis>& axes,
                                          const MapOptions& options = {});

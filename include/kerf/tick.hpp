@@ -136,12 +136,12 @@ struct TickRecord {
   std::uint16_t dirty_hi[3];      ///< its end, exclusive
   std::uint32_t lost_packets;     ///< since the start
   std::uint32_t dirty_volumes;    ///< bit v: volume v changed in this tick
-  std::uint32_t last_command;     ///< `Command::index` of the newest that the servo took; 0: none
+  std::uint32_t last_command;     ///< number of the newest of a reader that was applied; 0: none
   float tip_torque_n_mm[3];
   float spindle_ratio;
   std::int32_t raw[11];  ///< as received from the device; kRaw...
   float press_n;         ///< normal force that cuts, in the scene
-  // One field for each `EnergySource`, in steps of 2^-32 mJ. Their sum is `port_energy_j`.
+  // `port_energy_j` by source, in steps of 2^-32 mJ.
   std::int64_t energy_spring;
   std::int64_t energy_damping;
   std::int64_t energy_friction;
@@ -183,7 +183,7 @@ inline constexpr std::uint32_t kFlagRedo = 1U << 16;      ///< a redo is in prog
 inline constexpr std::uint32_t kFlagRedoable = 1U << 17;  ///< a redo is possible
 inline constexpr std::uint32_t kFlagPedal = 1U << 18;     ///< cuts only while button 1 is pressed
 
-/// Bits of `TickRecord::command`: a `ServoCommand::Kind` (not a `CommandKind`), one bit that is
+/// Bits of `TickRecord::command`: a `ServoCommand::Kind`, one bit that is
 /// set if the force fades in again after a stall of the servo, and above kCommandMissedShift how
 /// many ticks the servo missed before this one.
 inline constexpr std::uint32_t kCommandKind = 0xff;

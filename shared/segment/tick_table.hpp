@@ -19,8 +19,8 @@
 
 namespace kerf {
 
-/// The part of the servo step that makes a field, in its order. A replay names the first that
-/// differs.
+/// The part of the servo step that makes a field, causes before what follows from them. A replay
+/// names the first that differs.
 enum class TickStage : std::uint8_t {
   given,  ///< to a replay, or by the machine of the run: not compared
   pose,
@@ -73,7 +73,7 @@ inline constexpr TickCode kTickFlags[] = {
      "the last stroke is undone: no force, and nothing is cut; `removed` is given back"},
     {kFlagUndoable, "undoable", "the last stroke can be undone"},
     {kFlagRedo, "redo", "a stroke that was undone is cut again: no force; `removed` is it"},
-    {kFlagRedoable, "redoable", "it can be"},
+    {kFlagRedoable, "redoable", "a stroke that was undone can be cut again"},
     {kFlagPedal, "pedal", "the tool cuts only while button 1 is pressed"},
 };
 inline constexpr TickCode kTickCommands[] = {

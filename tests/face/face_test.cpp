@@ -174,7 +174,12 @@ TEST_CASE("commands: one of a person a tick, then missed ticks, then a fade") {
   CHECK((tick.command & kerf::kCommandKind) == static_cast<std::uint32_t>(Kind::select_tool));
   CHECK((tick.command & kerf::kCommandFadeIn) != 0);
   CHECK((tick.command >> kerf::kCommandMissedShift) == 3);
+  CHECK_FALSE(servo.apply({Kind::hold, 77}));
+  CHECK_FALSE(servo.apply({Kind::reset, 1}));
   CHECK(servo.apply({Kind::hold, 1}));
+  CHECK(servo.apply({Kind::missed, 70'000}));
+  CHECK((servo.step(hand.next(servo.last())).command >> kerf::kCommandMissedShift) ==
+        kerf::kMostMissed);
 }
 
 TEST_CASE("a recording is checked, read and replayed, and what was changed in it is found") {
@@ -253,11 +258,67 @@ TEST_CASE("a recording has each tick from the first on, once") {
         place + "a tick of 1 arms, and the scene has 2; add all of them");
   log.add(first);
   const std::string again =
-      place + "tick 1, and tick 2 comes next; begin before the first step, add each tick once";
+      place + "tick 1, and tick 2 comes next; add each tick of one run once, from the first on";
   CHECK(error_of([&] { log.add(first); }) == again);
+  log.close();
+  CHECK(error_of([&] { log.add(first); }) == place + "is closed; write another recording");
   servo.step(std::vector<kerf::DeviceReport>(5));
   CHECK(servo.last(1).tick == 2);
   CHECK(servo.last(7).tick == 2);
+}
+
+TEST_CASE(
+    "an assignment ends the recording that was there, and a close that failed can be repeated") {
+  const TemporaryFolder folder;
+  const kerf::Scene scene = wall();
+  kerf::Servo servo(scene);
+  kerf::LogWriter log(folder.path() / "a", scene);
+  for (int i = 0; i < 10; ++i) log.add(servo.step(kerf::DeviceReport{}));
+  log = kerf::LogWriter(folder.path() / "b", scene);
+  CHECK(kerf::Log::open(folder.path() / "a").rows() == 10);
+  CHECK(kerf::Log::open(folder.path() / "a").check() == std::vector<std::string>{});
+  fs::rename(folder.path() / "b", folder.path() / "c");
+  CHECK(error_of([&] { log.close(); }) != "no error");
+  fs::rename(folder.path() / "c", folder.path() / "b");
+  log.close();
+  CHECK(kerf::Log::open(folder.path() / "b").check() == std::vector<std::string>{});
+}
+
+TEST_CASE("what a visitor throws comes out as it is") {
+  struct Mine {};
+  const TemporaryFolder folder;
+  const kerf::Scene scene = wall();
+  kerf::Servo servo(scene);
+  kerf::LogWriter writer(folder.path() / "run", scene);
+  for (int i = 0; i < 2000; ++i) writer.add(servo.step(kerf::DeviceReport{}));
+  writer.close();
+  kerf::Log log = kerf::Log::open(folder.path() / "run");
+  int visited = 0;
+  const auto third = [&] {
+    if (++visited == 3) throw Mine();
+  };
+  CHECK_THROWS_AS(log.for_each([&](const kerf::TickRecord&) { third(); }), Mine);
+  CHECK(visited == 3);
+  visited = 0;
+  CHECK_THROWS_AS(static_cast<void>(log.replay(
+                      {}, [&](const kerf::TickRecord&, const kerf::TickRecord&) { third(); })),
+                  Mine);
+  CHECK(visited == 3);
+  log.for_each({});
+}
+
+TEST_CASE("a hand is that of the scene, and its motors those of the emulated device") {
+  const kerf::Scene scene = kerf::Scene::load(kScenes + "/phantom.toml");
+  kerf::Servo own(scene), given(scene);
+  kerf::Hand of_scene(scene), of_file(scene, kScenes + "/hands/cut_cavity.toml");
+  for (int i = 0; i < 1200; ++i) {
+    own.step(of_scene.next(own.last()));
+    given.step(of_file.next(given.last()));
+  }
+  CHECK(own.last().output_hash == given.last().output_hash);
+  CHECK(error_of([] { kerf::Hand hand(wall({"device.torque_scale=[0.9, 0.9, 0.9]"}), kHand); }) ==
+        "device.torque_scale = [0.9, 0.9, 0.9]: the emulated motors have [0.342, 0.342, 0.342]; "
+        "leave it out");
 }
 
 TEST_CASE("a running controller is read and asked") {
@@ -316,9 +377,10 @@ TEST_CASE("a running controller is read and asked") {
         "volume 1: the controller has 1; they count from 0");
 
   using Kind = kerf::ServoCommand::Kind;
-  CHECK(running.send({Kind::select_tool, 1}));
-  CHECK_FALSE(running.send({Kind::select_tool, 2}));
-  CHECK_FALSE(running.send({Kind::missed, 1}));
+  CHECK(running.send({Kind::select_tool, 1}) == 1);
+  CHECK(running.send({Kind::select_tool, 2}) == 0);
+  CHECK(running.send({Kind::missed, 1}) == 0);
+  CHECK(running.send({Kind::mark}) == 2);
   const auto taken = server->take_command();
   REQUIRE(taken.has_value());
   CHECK(taken->kind == kerf::CommandKind::select_tool);
@@ -332,11 +394,11 @@ TEST_CASE("a scene of voxels from memory") {
   std::vector<std::uint16_t> density(40 * 30 * 20, 0);
   for (int z = 3; z < 17; ++z) {
     for (int y = 3; y < 15; ++y) {  // a block in air
-      for (int x = 3; x < 37; ++x) density[static_cast<std::size_t>((z * 30 + y) * 40 + x)] = 65535;
+      for (int x = 3; x < 37; ++x) density[static_cast<std::size_t>((z * 30 + y) * 40 + x)] = 40000;
     }
   }
   constexpr std::string_view kText =
-      "[[volume]]\nfile = \"block\"\nwindow = [0, 65535]\ncrop = false\n[[tool]]\nshape = "
+      "[[volume]]\nfile = \"block\"\ncrop = false\n[[tool]]\nshape = "
       "\"ball\"\n"
       "radius_mm = 0.5\n[force]\nstiffness_n_per_mm = 0.4\n[cut]\nmodel = \"none\"\n";
   const kerf::Voxels voxels{{40, 30, 20}, {0.2, 0.2, 0.2}, density};
@@ -344,9 +406,21 @@ TEST_CASE("a scene of voxels from memory") {
   kerf::Servo servo(scene);
   const kerf::VoxelView view = servo.voxels(0);
   CHECK(view.size == std::array<int, 3>{40, 30, 20});
+  CHECK(view.spacing_mm == std::array<double, 3>{0.2, 0.2, 0.2});
+  // Its middle is the world's, and its z axis is up.
+  CHECK(view.origin_mm[0] == doctest::Approx(-0.1 * 39));
+  CHECK(view.origin_mm[1] == doctest::Approx(-0.1 * 19));
+  CHECK(view.origin_mm[2] == doctest::Approx(0.1 * 29));
   CHECK(std::ranges::equal(view.density, density));
   CHECK(servo.voxels(1).density.empty());
 
+  for (const char* const key : {"window = [0, 65535]", "spacing_mm = [1, 1, 1]"}) {
+    std::string text(kText);
+    text.insert(text.find("crop"), std::string(key) + "\n");
+    CHECK(error_of([&] {
+            static_cast<void>(kerf::Scene::of_voxels(voxels, text));
+          }).ends_with("is of files, and these voxels come from memory; leave it out"));
+  }
   kerf::Voxels few = voxels;
   few.density = few.density.first(10);
   CHECK(error_of([&] { static_cast<void>(kerf::Scene::of_voxels(few, kText)); }) ==
@@ -413,7 +487,7 @@ TEST_CASE("faults of an emulated device reach the servo") {
 TEST_CASE("a hand without a script is led") {
   const kerf::Scene scene = wall();
   kerf::Servo servo(scene);
-  kerf::Hand hand(scene);
+  kerf::Hand hand(scene, fs::path());
   std::array<double, 3> aim{};
   for (int i = 0; i < 3000; ++i) {
     const kerf::TickRecord& tick = servo.step(hand.next(servo.last()));
@@ -425,6 +499,40 @@ TEST_CASE("a hand without a script is led") {
   CHECK(std::abs(hand.tip_mm()[0] - aim[0]) < 0.3);
   CHECK(std::abs(hand.tip_mm()[1] - aim[1]) < 0.3);
   CHECK(std::abs(servo.last().position_mm[0] - hand.tip_mm()[0]) < 0.1);
+}
+
+TEST_CASE("a loop or a map that means nothing has no verdict") {
+  kerf::SampledLoop loop = kerf::device_loop("falcon", 1000);
+  CHECK(kerf::problem_in(loop).empty());
+  for (double kerf::SampledLoop::*const member :
+       {&kerf::SampledLoop::mass_kg, &kerf::SampledLoop::period_s, &kerf::SampledLoop::delay_s,
+        &kerf::SampledLoop::quantum_mm, &kerf::SampledLoop::coulomb_n,
+        &kerf::SampledLoop::velocity_filter_s, &kerf::SampledLoop::viscous_ns_per_mm}) {
+    for (const double wrong : {-1.0, std::nan(""), HUGE_VAL}) {
+      kerf::SampledLoop bad = loop;
+      bad.*member = wrong;
+      CHECK_FALSE(kerf::problem_in(bad).empty());
+      CHECK(error_of([&] { static_cast<void>(kerf::run_on_wall({.loop = bad})); }) ==
+            kerf::problem_in(bad));
+    }
+  }
+  for (double kerf::WallRun::*const member :
+       {&kerf::WallRun::stiffness_n_per_mm, &kerf::WallRun::damping_ns_per_mm,
+        &kerf::WallRun::push_n, &kerf::WallRun::hit_mm_per_s, &kerf::WallRun::seconds}) {
+    for (const double wrong : {-1.0, std::nan(""), 1e300}) {
+      kerf::WallRun run{.loop = loop};
+      run.*member = wrong;
+      CHECK(error_of([&] { static_cast<void>(kerf::run_on_wall(run)); }).find(": give one from") !=
+            std::string::npos);
+    }
+  }
+  const auto map = [](const std::vector<kerf::MapAxis>& axes, const kerf::MapOptions& options) {
+    return error_of([&] { static_cast<void>(kerf::stability_map("1,2", axes, options)); });
+  };
+  CHECK(map({{"damping", "0"}, {"damping", "0.1"}}, {}) == "axis damping: given twice");
+  CHECK(map({}, {.seeds = 0}) == "seeds = 0: give one from 1 to 100");
+  CHECK(map({}, {.seconds = std::nan("")}).starts_with("seconds = nan"));
+  CHECK(map({{"stiffness", "1"}}, {}) == "axis stiffness: it is the first argument");
 }
 
 TEST_CASE("boundary, run and map agree") {
