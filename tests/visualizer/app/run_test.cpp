@@ -414,14 +414,14 @@ TEST_CASE("n writes the window's view, and a headless run from there shows the s
   const auto shot = [&](const char* name) { return upper_half(options.out / name); };
   const std::string camera = (options.out / "kerf-0001-camera.toml").string();
   CHECK(picture_of("first", "") == shot("kerf-0001.png"));
-  // The file has six digits after the point.
+  // The file has six digits after the point, and a texture unit may filter with 8 bits of weight.
   const std::vector<std::uint8_t> moved = picture_of("moved", camera);
   const std::vector<std::uint8_t> seen = shot("kerf-0002.png");
   REQUIRE(moved.size() == seen.size());
   int most = 0;
   for (std::size_t i = 0; i < moved.size(); ++i)
     most = std::max(most, std::abs(moved[i] - seen[i]));
-  CHECK(most <= 1);
+  CHECK(most <= 2);
   CHECK(shot("kerf-0001.png") != shot("kerf-0002.png"));
   CHECK(test::text_of(place / "first.png") != test::text_of(place / "moved.png"));  // sheets
 }
