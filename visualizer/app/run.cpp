@@ -146,10 +146,10 @@ class WindowSound {
 bool step(WindowRun& run, Window& window, WindowSound& sound) {
   const auto begin = Clock::now();
   const WindowInput input = window.poll();
-  const auto [quit, drawn, leads_hand] = run.step(input, input.size, begin);
+  const auto [quit, drawn, parts, leads_hand] = run.step(input, input.size, begin);
   sound.step(input, run, begin);
   window.show_pointer(!leads_hand);
-  if (drawn != nullptr) window.present(*drawn);
+  if (drawn != nullptr) window.present(*drawn, parts);
   return !quit;
 }
 

@@ -116,8 +116,10 @@ WindowRun::Frame WindowRun::step(const WindowInput& input, PictureSize size,
   foretell_end(now);
   if (keys_.screenshot) notices_.clear();  // what was said of the one before
   if (!visible) return {};
-  const Redrawn redrawn = draw(size, input, now);
+  Redrawn redrawn = draw(size, input, now);
+  if (input.exposed) redrawn.parts = {target_->all()};
   return {.drawn = redrawn.any || input.exposed ? &*target_ : nullptr,
+          .parts = std::move(redrawn.parts),
           .leads_hand = pointer_leads_};
 }
 

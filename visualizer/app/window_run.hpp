@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <glm/glm.hpp>
 
@@ -81,6 +82,7 @@ class WindowRun {
   struct Frame {
     bool quit = false;                    ///< the user wants to leave; nothing else was done
     const RenderTarget* drawn = nullptr;  ///< to be presented; none: what was, stays
+    std::vector<PixelRect> parts{};       ///< of it, that are not what the last frame presented
     bool leads_hand = false;              ///< the ring stands for the pointer
   };
 

@@ -2,6 +2,7 @@
 #include "visualizer/gl/window.hpp"
 
 #include <epoxy/gl.h>
+#include <epoxy/glx.h>
 // After the GL loader.
 #include <algorithm>
 #include <cmath>
@@ -13,8 +14,9 @@
 
 #include "visualizer/scene/visualizer_error.hpp"
 
-// A GLFW that is built for Wayland alone lacks it.
+// A GLFW that is built for Wayland alone lacks them.
 extern "C" __attribute__((weak)) Display* glfwGetX11Display();
+extern "C" __attribute__((weak)) ::Window glfwGetX11Window(GLFWwindow* handle);
 
 namespace kerf {
 
@@ -135,6 +137,48 @@ void add_gamepad(HeldControls& held) {
                 held.tilt_up != keys.tilt_up;
 }
 
+/// Whether parts of a picture may be copied to the window of the current context one by one, and
+/// cost less than all of it: a software GL draws each pixel that it copies, and waits for no
+/// refresh.
+bool can_show_parts(GLFWwindow* handle) {
+  Display* const display = glfwGetX11Display != nullptr ? glfwGetX11Display() : nullptr;
+  if (display == nullptr) return false;
+  if (glfwGetWindowAttrib(handle, GLFW_CONTEXT_CREATION_API) != GLFW_NATIVE_CONTEXT_API) {
+    return false;
+  }
+  return query_gl_driver().software &&
+         epoxy_has_glx_extension(display, DefaultScreen(display), "GLX_MESA_copy_sub_buffer");
+}
+
+/// Of a window of which `can_show_parts` is true: whether the screen gives it this size now.
+bool has_size(GLFWwindow* handle, PictureSize size) {
+  ::Window root = 0;
+  int x = 0, y = 0;
+  unsigned width = 0, height = 0, border = 0, depth = 0;
+  const int found = XGetGeometry(glfwGetX11Display(), glfwGetX11Window(handle), &root, &x, &y,
+                                 &width, &height, &border, &depth);
+  return found != 0 && PictureSize{static_cast<int>(width), static_cast<int>(height)} == size;
+}
+
+/// Rectangles that cover `parts`. Each costs as much as so many pixels more (35 us by llvmpipe, of
+/// which a pixel costs 4 to 5 ns), so two become one if that has no more than these.
+std::vector<PixelRect> joined(std::span<const PixelRect> parts) {
+  constexpr int kPixelsOfOne = 8000;
+  std::vector<PixelRect> rects;
+  for (PixelRect rect : parts) {
+    const auto joins = [&](const PixelRect& other) {
+      return rect.united(other).area() <= rect.area() + other.area() + kPixelsOfOne;
+    };
+    for (auto with = std::ranges::find_if(rects, joins); with != rects.end();
+         with = std::ranges::find_if(rects, joins)) {
+      rect = rect.united(*with);
+      rects.erase(with);
+    }
+    rects.push_back(rect);
+  }
+  return rects;
+}
+
 }  // namespace
 
 glm::dvec2 pixels_per_unit(PictureSize pixels, PictureSize units) noexcept {
@@ -187,6 +231,7 @@ Window::Window(const WindowPlace& place, Visibility visibility) {
   glfwSetWindowSizeCallback(handle_, on_resized);
   outlive_the_screen();
   watch_for_faults();
+  shows_parts_ = can_show_parts(handle_);
   glfwSwapInterval(1);
   if (!place.size || place.monitor) fit(monitor, place.monitor.has_value());
   if (visibility == Visibility::hidden) return;
@@ -229,14 +274,34 @@ void Window::on_resized(GLFWwindow* handle, int /*width*/, int /*height*/) {
   window_of(handle).moved_ = true;
 }
 
-void Window::present(const RenderTarget& target) {
+void Window::present(const RenderTarget& target, std::span<const PixelRect> parts) {
   const PictureSize size = target.size();
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);  // Mesa takes a new size over from a bound window only
+  const auto copy = [&](const PixelRect& rect) {
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(rect.x0, rect.y0, rect.x1 - rect.x0, rect.y1 - rect.y0);
+    glBlitNamedFramebuffer(target.framebuffer(), 0, 0, 0, size.width, size.height, 0, 0, size.width,
+                           size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  };
+  const std::vector<PixelRect> rects = joined(clipped(parts, target.all()));
+  const bool whole = std::ranges::find(rects, target.all()) != rects.end();
+  bool shows = std::exchange(has_shown_, true) && shows_parts_ && !whole && has_size(handle_, size);
+  if (shows) {
+    // Nothing else in the back buffer is shown. A part beyond the size that Mesa took over with
+    // the first of these calls after a swap would be an error of X, which ends the process.
+    for (const PixelRect& rect : rects) copy(rect);
+    shows = has_size(handle_, size);
+  }
+  if (shows) {
+    for (const PixelRect& rect : rects) {
+      glXCopySubBufferMESA(glXGetCurrentDisplay(), glXGetCurrentDrawable(), rect.x0, rect.y0,
+                           rect.x1 - rect.x0, rect.y1 - rect.y0);
+    }
+  } else {
+    copy(target.all());
+    glfwSwapBuffers(handle_);
+  }
   glDisable(GL_SCISSOR_TEST);
-  glBlitNamedFramebuffer(target.framebuffer(), 0, 0, 0, size.width, size.height, 0, 0, size.width,
-                         size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-  glfwSwapBuffers(handle_);
-  has_shown_ = true;
 }
 
 void Window::show_pointer(bool shown) {

@@ -97,8 +97,9 @@ class Window final : public GlContext {
   /// F11 does so too, on the monitor that shows most of the window. A monitor that is unplugged
   /// leaves a window on another one.
   void set_full_screen(bool full);
-  /// Shows `target`, which has the window's size; waits for the screen's refresh if it can.
-  void present(const RenderTarget& target);
+  /// Shows `target`, which has the window's size and is what the call before showed but for
+  /// `parts`; waits for the screen's refresh if it can.
+  void present(const RenderTarget& target, std::span<const PixelRect> parts);
   /// Whether the pointer is seen over it.
   void show_pointer(bool shown);
   /// Throws VisualizerError once the X server is gone.
@@ -139,9 +140,10 @@ class Window final : public GlContext {
   std::array<bool, 3> down_{};  ///< buttons, by GLFW's numbers
   bool pedal_ = false;          ///< the space bar is down
   bool pointer_shown_ = true;
-  bool has_shown_ = false;  ///< a picture
-  bool f11_ = false;        ///< pressed since the last `poll`
-  bool moved_ = false;      ///< the window, or its edges
+  bool shows_parts_ = false;  ///< a part of its picture costs less than the whole
+  bool has_shown_ = false;    ///< a picture
+  bool f11_ = false;          ///< pressed since the last `poll`
+  bool moved_ = false;        ///< the window, or its edges
   bool full_screen_ = false;
   PixelRect before_;  ///< it filled a monitor: from the upper left corner of the desktop
 };

@@ -241,7 +241,7 @@ void Monkey::frame(const WindowInput& input) {
   if (!rests_) shown_ = {size_, frame.drawn->read_rgb()};
   if (window_ != nullptr) {
     static_cast<void>(window_->poll());
-    if (!rests_) window_->present(*frame.drawn);
+    if (!rests_) window_->present(*frame.drawn, frame.parts);
   }
   if (release_) pointer_.down = release_ = false;
 }

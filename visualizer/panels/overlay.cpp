@@ -198,7 +198,29 @@ void Overlay::show(const SliceViews& slices) {
   uploaded_ = slices;
 }
 
-PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
+namespace {
+
+/// The pixels that a command may touch: its clip rectangle is that of the picture for most.
+PixelRect drawn_by(const ImDrawList& panel, const ImDrawCmd& command, int height) {
+  const ImVec4& clip = command.ClipRect;  // from the upper left corner, as all places are
+  float left = clip.z, right = clip.x, top = clip.w, bottom = clip.y;
+  for (unsigned i = 0; i < command.ElemCount; ++i) {
+    const unsigned index = panel.IdxBuffer[static_cast<int>(command.IdxOffset + i)];
+    const ImVec2& at = panel.VtxBuffer[static_cast<int>(command.VtxOffset + index)].pos;
+    left = std::min(left, at.x);
+    right = std::max(right, at.x);
+    top = std::min(top, at.y);
+    bottom = std::max(bottom, at.y);
+  }
+  const auto lowest = static_cast<int>(std::ceil(std::min(bottom, clip.w)));
+  const auto highest = static_cast<int>(std::floor(std::max(top, clip.y)));
+  return {static_cast<int>(std::floor(std::max(left, clip.x))), height - lowest,
+          static_cast<int>(std::ceil(std::min(right, clip.z))), height - highest};
+}
+
+}  // namespace
+
+std::vector<PixelRect> Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
   begin_frame(figures, size);
   OverlayFigures shown = figures;
   // ImGui learns the size of what a panel holds by laying it out, and the room of a panel is what
@@ -211,18 +233,19 @@ PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
     if (now == before) break;
     before = std::move(now);
   }
-  PixelRect bounds;
+  std::vector<PixelRect> all;
   const ImDrawData& panels = *ImGui::GetDrawData();
   for (int i = 0; i < panels.CmdListsCount; ++i) {
-    for (ImDrawCmd& command : panels.CmdLists[i]->CmdBuffer) {
-      ImVec4& clip = command.ClipRect;                            // from the upper left corner
-      clip.z = std::min(clip.z, static_cast<float>(size.width));  // the other eye's begins there
-      bounds = bounds.united(PixelRect{
-          static_cast<int>(std::floor(clip.x)), size.height - static_cast<int>(std::ceil(clip.w)),
-          static_cast<int>(std::ceil(clip.z)), size.height - static_cast<int>(std::floor(clip.y))});
+    ImDrawList& panel = *panels.CmdLists[i];
+    PixelRect bounds;
+    for (ImDrawCmd& command : panel.CmdBuffer) {
+      // The other eye's picture begins there.
+      command.ClipRect.z = std::min(command.ClipRect.z, static_cast<float>(size.width));
+      bounds = bounds.united(drawn_by(panel, command, size.height));
     }
+    if (!bounds.empty()) all.push_back(bounds);
   }
-  return bounds;
+  return all;
 }
 
 void Overlay::draw(const RenderTarget& target, int eyes) {

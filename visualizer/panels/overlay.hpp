@@ -131,9 +131,9 @@ class Overlay {
   /// What the mouse does to the controls of `figures`, which it changes; draws nothing. True while
   /// the mouse belongs to them and not to the camera.
   bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
-  /// Lays the panels out; returns the part of a picture of this size that they cover. What of them
+  /// Lays the panels out; returns the part of a picture of this size that each covers. What of them
   /// is wider is cut off.
-  PixelRect prepare(const OverlayFigures& figures, PictureSize size);
+  std::vector<PixelRect> prepare(const OverlayFigures& figures, PictureSize size);
   /// Draws what was laid out last over `target`: once, or once for each of the `eyes` that lie side
   /// by side in it, at the same place for both, so that the panels seem to lie in the screen.
   void draw(const RenderTarget& target, int eyes = 1);

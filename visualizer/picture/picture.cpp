@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -299,18 +300,26 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   if (rests && same_target && panel == shown_figures_) return {};
 
   if (!same_target) clear(target);  // an odd column belongs to neither eye
-  const PixelRect panels = overlay_.prepare(panel, size);
+  const std::vector<PixelRect> panels = overlay_.prepare(panel, size);
+  // They let the picture shine through.
+  std::vector<PixelRect> under_panels = panels;
+  std::copy_if(
+      shown_panels_.begin(), shown_panels_.end(), std::back_inserter(under_panels),
+      [&](const PixelRect& before) { return std::ranges::find(panels, before) == panels.end(); });
+  std::vector<PixelRect> parts;
   double redrawn = 0.0, pixels = 0.0;
   for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {
     std::vector<PixelRect> others = eyes_[eye].draw(redraws[eye], *painter_, passes_);
     const RenderTarget& seen = eyes_[eye].seen();
     if (same_target) {
-      others.push_back(panels.united(shown_panels_));  // they let the picture shine through
+      others.insert(others.end(), under_panels.begin(), under_panels.end());
     } else {
       others = {seen.all()};
     }
-    for (const PixelRect& part : others) {
-      target.copy_colour(seen, part, static_cast<int>(eye) * size.width);
+    const int right = static_cast<int>(eye) * size.width;
+    for (const PixelRect& part : clipped(others, seen.all())) {
+      target.copy_colour(seen, part, right);
+      parts.push_back({part.x0 + right, part.y0, part.x1 + right, part.y1});
     }
     const bool translucent = painter_->any(ScenePainter::Layer::translucent);
     const std::vector<PixelRect>& volumes =
@@ -325,7 +334,9 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   shown_in_ = target.framebuffer();
   shown_size_ = target.size();
   shown_panels_ = panels;
-  return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height), pixels};
+  if (!same_target) parts = {target.all()};
+  return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height), pixels,
+          std::move(parts)};
 }
 
 bool Picture::is_late() const {

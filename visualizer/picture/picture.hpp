@@ -18,9 +18,10 @@ namespace kerf {
 
 /// What a call of `Picture::draw` did.
 struct Redrawn {
-  bool any = false;       ///< false: nothing had changed, nothing was drawn
-  double fraction = 0.0;  ///< of the picture's pixels in which volumes were drawn again
-  double pixels = 0.0;    ///< how many were, of a coarse part fewer than it covers
+  bool any = false;                ///< false: nothing had changed, nothing was drawn
+  double fraction = 0.0;           ///< of the picture's pixels in which volumes were drawn again
+  double pixels = 0.0;             ///< how many were, of a coarse part fewer than it covers
+  std::vector<PixelRect> parts{};  ///< of the target; elsewhere it is what it was; may overlap
 };
 
 /// Everything that is seen of one session: backdrop, volumes, tool, force arrow, panel.
@@ -104,9 +105,9 @@ class Picture {
   double most_pixels_ = std::numeric_limits<double>::infinity();
   Overlay overlay_;
   OverlayFigures shown_figures_;
-  GLuint shown_in_ = 0;     ///< framebuffer, whose name may be given to a later one
-  PictureSize shown_size_;  ///< of all of it
-  PixelRect shown_panels_;  ///< of each eye
+  GLuint shown_in_ = 0;                  ///< framebuffer, whose name may be given to a later one
+  PictureSize shown_size_;               ///< of all of it
+  std::vector<PixelRect> shown_panels_;  ///< of each eye
 };
 
 /// `Picture::draw`, complete when it returns, with its times and what it did in the report;

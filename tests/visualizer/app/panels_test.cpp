@@ -74,6 +74,19 @@ double covered_left_of(int column, const std::vector<std::uint8_t>& rgb, Picture
   return static_cast<double>(count) / (size.width * size.height);
 }
 
+/// Whether a picture is white beside `panels`.
+bool white_beside(const std::vector<PixelRect>& panels, std::vector<std::uint8_t> rgb,
+                  PictureSize size) {
+  for (const PixelRect& panel : clipped(panels, {0, 0, size.width, size.height})) {
+    for (int y = panel.y0; y < panel.y1; ++y) {
+      const std::ptrdiff_t row = std::ptrdiff_t{size.height - 1 - y} * size.width;
+      std::fill(rgb.begin() + 3 * (row + panel.x0), rgb.begin() + 3 * (row + panel.x1),
+                std::uint8_t{255});
+    }
+  }
+  return std::ranges::all_of(rgb, [](std::uint8_t part) { return part == 255; });
+}
+
 /// Share of the pixels that `overlay` changes.
 double covered(Overlay& overlay, const OverlayFigures& figures, PictureSize size,
                std::vector<std::uint8_t>* picture = nullptr) {
@@ -82,10 +95,11 @@ double covered(Overlay& overlay, const OverlayFigures& figures, PictureSize size
   constexpr float kWhite[4] = {1.0F, 1.0F, 1.0F, 1.0F};
   glDisable(GL_SCISSOR_TEST);
   glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kWhite);
-  static_cast<void>(overlay.prepare(figures, size));
+  const std::vector<PixelRect> panels = overlay.prepare(figures, size);
   overlay.draw(target);
   glDisable(GL_SCISSOR_TEST);
   const std::vector<std::uint8_t> rgb = target.read_rgb();
+  CHECK(white_beside(panels, rgb, size));
   if (picture != nullptr) *picture = rgb;
   return covered_left_of(size.width, rgb, size);
 }

@@ -95,7 +95,8 @@ void wait_for(const fs::path& file) {
   REQUIRE(fs::exists(file));
 }
 
-/// The upper left corner of the screen that DISPLAY names.
+}  // namespace
+
 RgbPicture read_screen(PictureSize size) {
   Display* const display = XOpenDisplay(nullptr);
   REQUIRE(display != nullptr);
@@ -116,8 +117,6 @@ RgbPicture read_screen(PictureSize size) {
   XCloseDisplay(display);
   return picture;
 }
-
-}  // namespace
 
 bool have(const char* program) {
   const std::string command = std::string("command -v ") + program + " >/dev/null 2>&1";

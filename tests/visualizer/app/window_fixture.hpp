@@ -111,6 +111,9 @@ class UnpluggedMonitor {
 /// Where its upper left corner is.
 [[nodiscard]] std::array<int, 2> seen_place();
 
+/// The upper left corner of the screen that DISPLAY names.
+[[nodiscard]] RgbPicture read_screen(PictureSize size);
+
 /// Real events at the screen that DISPLAY names, and the time in which a window shows what they do.
 void act(const std::string& events);
 

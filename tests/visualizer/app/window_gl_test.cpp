@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Windows and pictures where OpenGL is old, or comes another way.
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -10,6 +11,9 @@
 
 #include "tests/support/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/gl/target.hpp"
+#include "visualizer/gl/window.hpp"
 #include "visualizer/picture/image_files.hpp"
 
 using namespace kerf;
@@ -46,6 +50,79 @@ TEST_CASE("a screen without GLX, or whose OpenGL is 3.3, shows a window") {
       act("key q");
       CHECK(window.wait() == 0);
     }
+  }
+}
+
+namespace {
+
+void fill(const RenderTarget& target, const PixelRect& part, float red) {
+  const float colour[4] = {red, 0.4F, 0.2F, 1.0F};
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(part.x0, part.y0, part.x1 - part.x0, part.y1 - part.y0);
+  glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, colour);
+  glDisable(GL_SCISSOR_TEST);
+}
+
+}  // namespace
+
+TEST_CASE("a window shows the parts of its picture that changed, and copies no other by llvmpipe") {
+  if (!have("Xvfb")) return;
+  constexpr PictureSize kSize{320, 200};
+  for (const bool has_glx : {true, false}) {
+    CAPTURE(has_glx);
+    const Screen screen("640x480", has_glx);
+    Window window({.size = kSize}, Window::Visibility::shown);
+    const RenderTarget target(kSize);
+    const auto show = [&](const std::vector<PixelRect>& parts) {
+      static_cast<void>(window.poll());
+      window.present(target, parts);
+      glFinish();
+    };
+    const auto is_shown = [&] { return read_screen(kSize).rgb == target.read_rgb(); };
+    fill(target, target.all(), 1.0F);
+    // Until the screen has the window.
+    CHECK(eventually(
+        [&] {
+          show({target.all()});
+          return is_shown();
+        },
+        std::chrono::seconds(20)));
+    // Two far apart, two that touch, one beyond the border.
+    const std::vector<PixelRect> parts{{3, 5, 20, 17},
+                                       {250, 150, 310, 199},
+                                       {100, 80, 120, 90},
+                                       {120, 80, 140, 95},
+                                       {300, -5, 400, 12}};
+    for (const float red : {0.0F, 0.5F}) {
+      for (const PixelRect& part : parts) fill(target, part.clipped(target.all()), red);
+      show(parts);
+      CHECK(eventually(is_shown, std::chrono::seconds(20)));
+    }
+    const std::vector<std::uint8_t> before = target.read_rgb();
+    fill(target, target.all(), 0.25F);
+    show({{40, 40, 41, 41}});
+    if (has_glx && query_gl_driver().software) {
+      std::vector<std::uint8_t> seen = before;
+      const auto pixel =
+          static_cast<std::ptrdiff_t>(3 * ((kSize.height - 1 - 40) * kSize.width + 40));
+      const std::vector<std::uint8_t> now = target.read_rgb();
+      std::copy_n(now.begin() + pixel, 3, seen.begin() + pixel);
+      CHECK(eventually([&] { return read_screen(kSize).rgb == seen; }, std::chrono::seconds(20)));
+    }
+    show({target.all()});
+    CHECK(eventually(is_shown, std::chrono::seconds(20)));
+    // The screen gives it another size, which it has not polled yet.
+    for (int i = 0; i < 20; ++i) {
+      window.resize(i % 2 == 0 ? PictureSize{200, 60} : kSize);
+      window.present(target, i % 3 == 0 ? std::vector{target.all()} : parts);
+    }
+    window.resize(kSize);
+    CHECK(eventually(
+        [&] {
+          show({target.all()});
+          return is_shown();
+        },
+        std::chrono::seconds(20)));
   }
 }
 

@@ -140,16 +140,36 @@ bool equals_whole(Picture& picture, const Run& run, const RenderTarget& target,
   return seen == target.read_rgb();
 }
 
-/// Changes volumes, hands and camera at random, and compares each part that was drawn again with
-/// drawing everything.
+/// Whether two pictures, as `RenderTarget::read_rgb` has them, are the same beside `parts`.
+bool same_beside(const std::vector<PixelRect>& parts, PictureSize size,
+                 std::vector<std::uint8_t> before, const std::vector<std::uint8_t>& now) {
+  for (const PixelRect& part : clipped(parts, {0, 0, size.width, size.height})) {
+    for (int y = part.y0; y < part.y1; ++y) {
+      const std::ptrdiff_t row = std::ptrdiff_t{size.height - 1 - y} * size.width;
+      std::copy(now.begin() + 3 * (row + part.x0), now.begin() + 3 * (row + part.x1),
+                before.begin() + 3 * (row + part.x0));
+    }
+  }
+  return before == now;
+}
+
+/// Changes volumes, hands, panels and camera at random, and compares each part that was drawn again
+/// with drawing everything.
 void check_parts(const ViewSettings& settings, PictureSize size, int edits, std::size_t arms = 1) {
   std::mt19937 random(3);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   Run run(arms);
   Picture picture(run.session, settings, 4.0 / 3.0);
   const RenderTarget target(size);
-  const OverlayFigures figures;
+  OverlayFigures figures;
   static_cast<void>(picture.draw(run.session, figures, target));
+  const auto draw = [&] {
+    const std::vector<std::uint8_t> before = target.read_rgb();
+    const Redrawn redrawn = picture.draw(run.session, figures, target);
+    CHECK(same_beside(redrawn.parts, size, before, target.read_rgb()));
+    CHECK(redrawn.any != redrawn.parts.empty());
+    return redrawn;
+  };
   const bool coarse =
       settings.renderer.find("slices") != std::string::npos;  // while something moves
   double redrawn = 0;
@@ -169,11 +189,14 @@ void check_parts(const ViewSettings& settings, PictureSize size, int edits, std:
       run.controller.move(hand, arms == 1 ? 0 : static_cast<std::size_t>(below(2)));
     }
     if (edit % 10 == 9) picture.camera().orbit(0.05, 0.01);
+    figures.force_n = 0.1 * (edit / 2);
+    figures.help = edit % 8 == 6;
+    figures.hidden = edit % 16 > 11;
     run.session.poll();
     picture.update(run.session);
-    const Redrawn part = picture.draw(run.session, figures, target);
+    const Redrawn part = draw();
     if (edit % 10 == 9 || edit % 4 == 3) {  // comes to rest
-      CHECK(picture.draw(run.session, figures, target).any == coarse);
+      CHECK(draw().any == coarse);
     }
     if (edit % 10 != 9) {
       redrawn += part.fraction;
