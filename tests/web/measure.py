@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a tab comes to its first picture, in headless Chromium with a new profile: of pages by turns, the best of N times, in
-ms from the address on.
+ms from the address on; and what all of its processes took of the cores until then.
 
     measure.py N PAGE-FOLDER...      PAGE-FOLDER: what ./kerf page wrote, of this version and of others
 
 Exit code 77: skipped, for want of a page or of a browser."""
+import os
 import pathlib
 import sys
 import tempfile
@@ -15,7 +16,7 @@ from tab import DESKTOP, find_chromium
 from browser import Page
 
 STEPS = {'worker': 'the worker is begun', 'to open': 'it is asked for a scene', 'context': 'WebGL', 'w opened': 'the scene is loaded',
-         'live': 'the volumes are in the page', 'drawn': 'the first picture is finished'}
+         'live': 'the volumes are in the page', 'drawn': 'the first picture is finished', 'cpu': 'of the cores, by all processes of the browser'}
 # What happens first, by its name.
 WATCH = '''(() => {
   const times = window.kerfTimes = {};
@@ -51,6 +52,13 @@ WATCH = '''(() => {
 })();'''
 
 
+def cpu_ms(pid):
+    """Of a process and those that it has begun."""
+    children = pathlib.Path(f'/proc/{pid}/task/{pid}/children').read_text().split()
+    user, system = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[11:13]
+    return 1000 * (int(user) + int(system)) / os.sysconf('SC_CLK_TCK') + sum(cpu_ms(child) for child in children)
+
+
 def times_of(folder):
     with tempfile.TemporaryDirectory() as profile, served(folder) as address:
         page = Page(find_chromium(), profile)
@@ -58,9 +66,11 @@ def times_of(folder):
             page.size(*DESKTOP)
             page.call('Page.addScriptToEvaluateOnNewDocument', source=WATCH)
             time.sleep(1)  # the start of the browser is not the page's
+            before = cpu_ms(page.process.pid)
             page.go(address)
             page.until("window.kerfTimes && 'drawn' in kerfTimes", 60)
-            return page.evaluate('kerfTimes')
+            after = cpu_ms(page.process.pid)
+            return page.evaluate('kerfTimes') | {'cpu': after - before}
         finally:
             page.close()
 
