@@ -43,8 +43,8 @@ export function programOf(gl, name, defines = '') {
   return known.get(key);
 }
 
-/** A program of `programOf`. Uniforms are set by name; one that the linker removed is ignored. */
-class Program {
+/** A program of `programOf`, or of one owner that keeps uniforms of its own in it. Uniforms are set by name; one that the linker removed is ignored. */
+export class Program {
   constructor(gl, name, defines) {
     Object.assign(this, {gl, name, linked: false});
     this.program = gl.createProgram();
@@ -73,6 +73,9 @@ class Program {
     }
     for (const shader of stages) gl.deleteShader(shader);
     this.linked = true;
+  }
+  free() {
+    this.gl.deleteProgram(this.program);
   }
   at(uniform) {
     if (!this.locations.has(uniform)) {

@@ -218,7 +218,7 @@ export class Painter {
   }
 
   free() {
-    for (const one of [...this.eyes, ...this.volumes, this.hand]) {
+    for (const one of [...this.eyes, ...this.volumes, this.hand, this.blend]) {
       one?.free();
     }
     this.gl.deleteTexture(this.palette);

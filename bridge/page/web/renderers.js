@@ -4,7 +4,7 @@
 import {clipFromEye, shownInEye} from './camera.js';
 import {surfaceMm} from './cell_gradients.js';
 import {kBlendStepVox} from './constants.js';
-import {bind, cover, programOf} from './gl.js';
+import {bind, cover, Program, programOf} from './gl.js';
 import {affineInverse, multiply, turn} from './math.js';
 import {leastExtinction} from './transfer_function.js';
 
@@ -78,7 +78,7 @@ export class BlendCaster {
     const each = volumes.map((_, v) => `f(${v})`).join(' ');
     const bools = of => `bool[](${volumes.map(of).join(', ')})`;
     const cells = volumes.some(({plan}) => !plan.cubes) ? `#define KERF_HAS_CELLS ${bools(({plan}) => !plan.cubes)}\n` : '';
-    this.cast = programOf(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n#define KERF_EACH_VOLUME(f) ${each}\n` +
+    this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n#define KERF_EACH_VOLUME(f) ${each}\n` +
       `#define KERF_HAS_LABELS ${bools(({volume}) => volume.labels !== null)}\n${cells}`);
     this.layer = programOf(gl, 'layer');
     this.layer.use();
@@ -134,5 +134,8 @@ export class BlendCaster {
     this.layer.use();
     cover(gl);
     gl.disable(gl.BLEND);
+  }
+  free() {
+    this.cast.free();
   }
 }
