@@ -74,8 +74,8 @@ def record(root, programs, folder, scene, seconds, *options, flight=False, fault
 
 
 def record_killed(root, programs, folder, scene, hands, *recorder, parts=1, rows=1500, synced=False):
-    """The log, `folder`/log, of a recorder that is killed in a run, after its manifest has the volumes, its log at least so many files and
-    that one some rows, and these are in the manifest if `synced`. hands: of an Omni, or of an Omni and a Touch, each with options of its emulator."""
+    """The log, `folder`/log, of a recorder that is killed in a run, after its manifest has the volumes, its log so many files and
+    the last one some rows, and these are in the manifest if `synced`. hands: of an Omni, or of an Omni and a Touch, each with options of its emulator."""
     name, log = f"killed-{folder.name}", folder / "log"
     os.mkfifo(lead := folder / "lead")
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -88,21 +88,26 @@ def record_killed(root, programs, folder, scene, hands, *recorder, parts=1, rows
                                         root / "scenes/hands" / hand, *hands[hand]], **quiet))
     others.append(subprocess.Popen([programs / "kerf-controller", "--scene", scene, "--virtual", "--until", lead, "--name", name,
                                     "--seconds", "1000", "--torque-scale", ",".join(["0.05,0.05,0.05", "1,1,1"][:len(hands)]), *ports], **quiet))
-    last = log / ("ticks.npy" if parts == 1 else f"ticks.npy.{parts:04}")
+    files = lambda: sorted(log.glob("ticks.npy*"))  # noqa: E731
     try:
         give_up = time.monotonic() + 20
-        while time.monotonic() < give_up and others[0].poll() is None:
+        while time.monotonic() < give_up and others[0].poll() is None and len(files()) <= parts:
             try:
                 lists = json.loads((log / "manifest.json").read_text())
-                if last.stat().st_size > 4096 + 496 * rows and len(lists["files"]) > 2:
+                if len(files()) == parts and files()[-1].stat().st_size > 4096 + 496 * rows and len(lists["files"]) > 2:
                     others[-1].send_signal(signal.SIGSTOP)  # the run: the recorder writes down what there is
-                    if lists["parts"] == len(list(log.glob("ticks.npy*"))) and ("first_rows" in lists or not synced):
+                    if lists["parts"] == len(files()) and ("first_rows" in lists or not synced):
                         break
-            except (OSError, ValueError):
+                else:  # it may have begun another file before it stood still
+                    others[-1].send_signal(signal.SIGCONT)
+            except (OSError, ValueError, IndexError):
                 pass
             time.sleep(0.001)
     finally:
         for program in others:
             program.kill()
             program.wait()
-    return log
+    if len(files()) <= parts:
+        return log
+    (again := folder / "again").mkdir()  # it was faster than we looked
+    return record_killed(root, programs, again, scene, hands, *recorder, parts=parts, rows=rows, synced=synced)
