@@ -8,7 +8,7 @@ import {clamp} from './math.js';
 
 const kFull = 65535;
 const axes = [0, 1, 2];
-const countOf = ([x, y, z]) => x * y * z;
+const countOf = size => size.reduce((count, n) => count * n);
 const extentOf = (low, high) => high.map((n, axis) => n - low[axis]);
 const cellsIn = ({low, high}) => countOf(extentOf(low, high));
 const largest = values => values.reduce((a, b) => Math.max(a, b));
@@ -76,6 +76,7 @@ export function joined(boxes) {
 }
 
 const scratch = [];
+const kGradients = 7;  // slot
 
 /** Numbers of a box, x fastest, of any value, until the next one in this slot: a block needs megabytes of them. */
 function fieldOf(size, slot) {
@@ -147,14 +148,16 @@ function partsOf([x, y, z], field, perCell, rows) {
     part(slope(6, smooth(3, smoothX, 1, y, forZ), 2, z, rows), z, x, y, 2)];
 }
 
-/** The gradients of the wanted cells that are marked, if `marks` is there, and the rows of those that are not 0. */
+/** The gradients of the wanted cells that are marked, if `marks` is there, and the rows of those that are not 0. They lie
+ * in memory that the next block takes. */
 function gathered(parts, rows, marks) {
   const [{values: xs, scale: sx}, {values: ys, scale: sy}, {values: zs, scale: sz}] = parts;
-  const gradients = new Float32Array(4 * countOf(rows.size)), sloped = new Rows(rows.size);
+  const {values: gradients} = fieldOf([4, ...rows.size], kGradients), sloped = new Rows(rows.size);
+  gradients.fill(0);
   for (let row = 0; row < rows.first.length; ++row) {
     for (let x = rows.first[row]; x < rows.end[row]; ++x) {
       const i = row * rows.size[0] + x;
-      if (marks && marks[i] === 0) continue;
+      if (marks && (marks[row] >>> x & 1) === 0) continue;
       const gx = sx * xs[i], gy = sy * ys[i], gz = sz * zs[i];
       if (gx === 0 && gy === 0 && gz === 0) continue;
       gradients[4 * i] = gx;
@@ -189,43 +192,43 @@ function adapt(gradients, wide, rows) {
   }
 }
 
-/** Which voxels of a box a point of the surface lies between, one a voxel; null: none. A point lies between eight voxels,
- * of which some have the iso density and some have not: so those with another one around them that differs. */
+/** Which voxels of a block a point of the surface lies between, a word for each row and a bit for each voxel; null: none.
+ * A point lies between eight voxels, of which some have the iso density and some have not: so those with another one around
+ * them that differs. A row of a block, with a voxel at both ends, is a word. */
 export function surfaceVoxels({size: [nx, ny, nz], density}, iso, low, high) {
-  const size = extentOf(low, high), [wide, tall, deep] = size.map(n => n + 2);
-  let counts = new Uint8Array(wide * tall * deep), solid = 0;
+  const [wide, tall, deep] = extentOf(low, high);
+  const solid = new Int32Array((tall + 2) * (deep + 2));  // outside of the volume there is air
   for (let z = Math.max(low[2] - 1, 0); z < Math.min(high[2] + 1, nz); ++z) {
     for (let y = Math.max(low[1] - 1, 0); y < Math.min(high[1] + 1, ny); ++y) {
-      const from = (z * ny + y) * nx, to = ((z - low[2] + 1) * tall + y - low[1] + 1) * wide - low[0] + 1;
+      const from = (z * ny + y) * nx;
+      let row = 0;
       for (let x = Math.max(low[0] - 1, 0); x < Math.min(high[0] + 1, nx); ++x) {
-        if (density[from + x] >= iso) solid += counts[to + x] = 1;
+        if (density[from + x] >= iso) row |= 1 << x - low[0] + 1;
       }
+      solid[(z - low[2] + 1) * (tall + 2) + y - low[1] + 1] = row;
     }
   }
-  if (solid === 0 || solid === counts.length) return null;
-  // How many of 27 are solid, axis by axis; ends of rows hold what no voxel of the box reads.
-  for (const stride of [1, wide, wide * tall]) {
-    const sums = new Uint8Array(counts.length);
-    for (let i = stride; i < counts.length - stride; ++i) sums[i] = counts[i - stride] + counts[i] + counts[i + stride];
-    counts = sums;
-  }
-  const marks = new Uint8Array(countOf(size));
-  let any = 0;
-  for (let z = 0, out = 0; z < size[2]; ++z) {
-    for (let y = 0; y < size[1]; ++y) {
-      for (let x = 0, at = ((z + 1) * tall + y + 1) * wide + 1; x < size[0]; ++x, ++at) {
-        any |= marks[out++] = counts[at] > 0 && counts[at] < 27 ? 1 : 0;
+  const marks = new Int32Array(tall * deep), inside = -1 >>> 32 - wide;
+  let found = 0;
+  for (let z = 0, row = 0; z < deep; ++z) {
+    for (let y = 0; y < tall; ++y, ++row) {
+      let some = 0, all = -1;
+      for (let k = z; k < z + 3; ++k) {
+        for (let at = k * (tall + 2) + y, j = 0; j < 3; ++j, ++at) {
+          some |= solid[at];
+          all &= solid[at];
+        }
       }
+      found |= marks[row] = (some | some >>> 1 | some >>> 2) & ~(all & all >>> 1 & all >>> 2) & inside;
     }
   }
-  return any ? marks : null;
+  return found ? marks : null;
 }
 
+/** From the first marked voxel of each row to the last one. */
 function markedRows(size, marks) {
   const rows = new Rows(size);
-  for (let row = 0, i = 0; row < size[1] * size[2]; ++row) {
-    for (let x = 0; x < size[0]; ++x, ++i) if (marks[i] !== 0) rows.take(row, x, x + 1);
-  }
+  marks.forEach((word, row) => word && rows.take(row, 31 - Math.clz32(word & -word), 32 - Math.clz32(word)));
   return rows;
 }
 
@@ -235,7 +238,8 @@ function isFlat(values) {
   return i === values.length;
 }
 
-const kBlock = 32;  // cells of an edge: most of a volume is air, or solid, and has no gradient
+// Cells of an edge: most of a volume is air, or solid, and has no gradient. With one more at both ends, bits of a word.
+const kBlock = 30;
 
 /** The cells of a volume: their mean densities, and gradients out of these. A border of cells one wide is
  * around it, since a voxel on the edge lies between the first cell and it. */
@@ -289,8 +293,8 @@ export class CellGradients {
     return field;
   }
 
-  /** Calls `put(low, high, gradients)` for each block of a box: four numbers a cell, the last is nothing; null: none has
-   * one. `marksOf(low, high)`: of which cells, one a cell; null: of none. Without it, of all. */
+  /** Calls `put(low, high, gradients)` for each block of a box: four numbers a cell, the last is nothing, until `put`
+   * returns; null: none has one. `marksOf(low, high)`: of which cells, as `surfaceVoxels`. Without it, of all. */
   blocks({low, high}, put, marksOf = null) {
     for (let z = low[2]; z < high[2]; z += kBlock) {
       for (let y = low[1]; y < high[1]; y += kBlock) {
