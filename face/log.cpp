@@ -60,7 +60,7 @@ struct LogWriter::Parts {
   ~Parts() {
     try {
       close();
-    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): who asks calls `close`
+    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): `close` reports it
     }
   }
   Parts(const Parts&) = delete;

@@ -37,13 +37,13 @@ struct Servo::Parts {
     if (missed && command.argument == 0) return false;
     if (!has_argument && command.argument > (command.kind == Kind::hold ? 1U : 0U)) return false;
     if (of_person && given.command.kind != Kind::none) return false;
-    ServoCommand bounded = command;
-    if (missed) bounded.argument = std::min(command.argument, kMostMissed);
-    if (!servo->apply(bounded)) return false;
-    if (of_person) given.command = command;
-    if (missed) given.missed = bounded.argument;
-    if (fade_in) given.fade_in = true;
-    return true;
+    TickCommands alone;
+    if (of_person) alone.command = given.command = command;
+    if (missed) alone.missed = given.missed = std::min(command.argument, kMostMissed);
+    if (fade_in) alone.fade_in = given.fade_in = true;
+    if (apply_commands(alone, *servo)) return true;
+    given.command = {};  // nothing else is ever refused
+    return false;
   }
 
   void step(std::span<const DeviceReport> given_reports) noexcept {

@@ -103,7 +103,7 @@ void make_records(const AnyServo& servo, std::span<const DeviceReport> reports,
     records[arm].penetration_mm = static_cast<float>(servo.penetration_mm(arm));
   }
 }
-/// The same, for a servo whose volumes nobody else publishes.
+/// The same; the hashes are those of the servo's own densities.
 void make_records(const AnyServo& servo, std::span<const DeviceReport> reports,
                   const TickCommands& commands, std::span<const ServoOutput> outputs,
                   std::uint64_t& chain, std::span<TickRecord> records) noexcept;

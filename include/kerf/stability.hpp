@@ -35,7 +35,7 @@ struct SampledHand {
 /// Linear except for `coulomb_n` and `quantum_mm`: the exact limits below ignore both,
 /// `quantum_stiffness` and runs use them. No structural mode: a bound of this model
 /// does not hold above the device's first resonance. Mass and period are positive, the rest is not
-/// negative; who reads files checks that.
+/// negative; a program that reads them from a file has to check that.
 struct SampledLoop {
   double mass_kg = 0.045;      ///< apparent, at the tip
   double viscous_ns_per_mm{};  ///< damping of the device itself, b

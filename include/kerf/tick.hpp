@@ -46,8 +46,8 @@ struct ServoCommand {
     hold,
     fade_in,  ///< force starts again from 0: after a stall of the servo
     reset,    ///< restores the volumes' first content, over several ticks; no-op without cutting
-    undo,     ///< restores the content before the last stroke, likewise; refused without one
-    redo,     ///< repeats the stroke that was undone last, likewise
+    undo,     ///< restores the content before the last stroke, if there is one; as a reset
+    redo,     ///< repeats the stroke that was undone last, if there is one; as a reset
     mark,     ///< changes nothing: marks a tick in the log
     missed    ///< ticks that the host skipped before this one: without a report, for all arms
   };
@@ -117,8 +117,8 @@ struct TickRecord {
   std::uint32_t missed_deadlines;
   std::int32_t encoder_counts[6];  ///< 0..2: joints, unwrapped since docking; 3..5: gimbal, mrad
   double position_mm[3];           ///< NaN in the phases off and calibrating
-  float orientation[4];            ///< quaternion x, y, z, w: tool to world; NaN likewise
-  float velocity_mm_per_s[3];      ///< NaN likewise, and until the user first takes the tool
+  float orientation[4];            ///< quaternion x, y, z, w: tool to world; NaN as the position
+  float velocity_mm_per_s[3];      ///< NaN as the position, and until the device is first in hand
   float commanded_force_n[3];
   float contact_force_n[3];
   float modification_force_n[3];

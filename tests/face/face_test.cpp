@@ -152,36 +152,6 @@ TEST_CASE("a state that was kept continues to the same bits, in another servo to
         "restore: the state is of another scene; keep one of this scene");
 }
 
-TEST_CASE("commands: one of a person a tick, then missed ticks, then a fade") {
-  using Kind = kerf::ServoCommand::Kind;
-  const kerf::Scene scene = kerf::Scene::load(kScenes + "/touch.toml");
-  REQUIRE(scene.tools().size() > 1);
-  kerf::Servo servo(scene);
-  kerf::Hand hand(scene, kHand);
-  for (int i = 0; i < 300; ++i) servo.step(hand.next(servo.last()));
-  CHECK_FALSE(servo.apply({Kind::none}));
-  CHECK_FALSE(servo.apply({Kind::select_tool, 99}));
-  CHECK_FALSE(servo.apply({Kind::undo}));
-  CHECK(servo.apply({Kind::select_tool, 1}));
-  CHECK_FALSE(servo.apply({Kind::hold, 1}));  // a second one
-  CHECK_FALSE(servo.apply({Kind::missed, 0}));
-  CHECK(servo.apply({Kind::missed, 3}));
-  CHECK_FALSE(servo.apply({Kind::mark}));  // behind them
-  CHECK(servo.apply({Kind::fade_in}));
-  CHECK_FALSE(servo.apply({Kind::fade_in}));
-  const kerf::TickRecord& tick = servo.step(hand.next(servo.last()));
-  CHECK(tick.active_tool == 1);
-  CHECK((tick.command & kerf::kCommandKind) == static_cast<std::uint32_t>(Kind::select_tool));
-  CHECK((tick.command & kerf::kCommandFadeIn) != 0);
-  CHECK((tick.command >> kerf::kCommandMissedShift) == 3);
-  CHECK_FALSE(servo.apply({Kind::hold, 77}));
-  CHECK_FALSE(servo.apply({Kind::reset, 1}));
-  CHECK(servo.apply({Kind::hold, 1}));
-  CHECK(servo.apply({Kind::missed, 70'000}));
-  CHECK((servo.step(hand.next(servo.last())).command >> kerf::kCommandMissedShift) ==
-        kerf::kMostMissed);
-}
-
 TEST_CASE("a recording is checked, read and replayed, and what was changed in it is found") {
   const TemporaryFolder folder;
   const fs::path run = folder.path() / "run";
