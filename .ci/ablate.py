@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""./kerf lab ablate: which constants and branches of the contact does a row need?
+"""./kerf studies ablate: which constants and branches of the contact does a row need?
 
   --only NAME,...  these of the list [contact] of .ci/mutations.txt; NAME+NAME: both at once   (all)
   --list           the names
@@ -116,7 +116,7 @@ def build(ablations, stages):
             shutil.copy(ROOT / file, mine)
     for file, content in changed.items():
         write_if_new(TREE / file, content)
-    targets = ["kerf-lab", "test_proxy", "test_point_shell"] + ["test_servo"] * (stages > 3)
+    targets = ["kerf-studies", "test_proxy", "test_point_shell"] + ["test_servo"] * (stages > 3)
     print(f"ablate: building {TREE}", file=sys.stderr)
     ccache = ["-DKERF_CCACHE=ON"] if os.environ.get("CCACHE_BASEDIR") else []
     for command in (["cmake", "--preset", "release", *ccache, "--log-level=ERROR"], ["ninja", "-C", "build/release", *targets]):
@@ -148,7 +148,7 @@ class Runs:
 
             def lab(groups):
                 quick = [] if self.full else ["--quick"]
-                code, _ = run([*environment, "build/release/bin/kerf-lab", "extremes", *quick, "--only", groups, "--report",
+                code, _ = run([*environment, "build/release/bin/kerf-studies", "extremes", *quick, "--only", groups, "--report",
                                here / "report.json"], here / "log", cwd=TREE, timeout=900)
                 if code > 1 or code < 0:
                     return {("runs", f"{groups} end with {code}"): (1.0, 0)}
@@ -248,11 +248,11 @@ def page(ablations, names, runs, options):
     commit = mutate.output_of("git", "rev-parse", "--short", "HEAD").strip()
     lines = [f"""# Ablation
 
-Made by `./kerf lab ablate --page {options.page}`; nothing is typed by hand. Each constant and each branch of the swept
+Made by `./kerf studies ablate --page {options.page}`; nothing is typed by hand. Each constant and each branch of the swept
 contact (`{TABLE}`) is turned off alone; A+B: both at once. Then these are run, from cheap to dear, and
 what comes after a stage that loses a row is left out, so more rows may get lost than are shown:
 
-1. `kerf-lab extremes{'' if options.full else ' --quick'}`: walls, rests, slides and shapes
+1. `kerf-studies extremes{'' if options.full else ' --quick'}`: walls, rests, slides and shapes
 2. the tests of proxy and point shell, in fixed point; a failed one counts as a lost row
 3. traps
 4. the tests of the servo
@@ -262,7 +262,7 @@ Here up to stage {options.stages}. A row moves by more than 1 % of its limit. Wh
 makes one worse by 5 % of its limit or more.
 
 {datetime.date.today()}, commit {commit}, {compiler}. The contact has
-{constants()} named constants (`./kerf lab ablate --count`).
+{constants()} named constants (`./kerf studies ablate --count`).
 
 | off | in | means | rows that move, the worst first | verdict |
 |---|---|---|---|---|"""]

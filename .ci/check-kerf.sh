@@ -106,9 +106,9 @@ case $name in
     touch "$out"
     if [[ -n ${MEANWHILE:-} ]]; then mkdir -p "${MEANWHILE%/*}" && echo mine >"$MEANWHILE"; fi
     ;;
-  lab)
+  studies)
     trap 'stop=1' TERM
-    echo 'emulator --hand of lab' >>"$LAB/calls"
+    echo 'emulator --hand of studies' >>"$LAB/calls"
     until [[ -z ${LONG:-} ]] || ((stop)); do sleep 0.02; done
     if ((!code)); then mkdir -p "$out" && touch "$out/report.json" "$out/frame-0001.png"; fi
     ;;
@@ -124,7 +124,7 @@ if [[ -n ${!crash:-} ]]; then wait; fi
 exit "$code"
 PROGRAM
 chmod +x "$lab/stand-in"
-for name in controller emulator visualizer recorder record bridge lab; do
+for name in controller emulator visualizer recorder record bridge studies; do
   ln -s ../stand-in "$lab/bin/kerf-$name"
 done
 
@@ -307,10 +307,10 @@ expect 'and is told' says 'bridge: ended by signal 11'
 expect 'all of it is cleared up' nothing_survives
 expect 'two machines, anywhere among the options' kerf_gives 0 demo --seconds 2 --set a.b=1 --loss 1 --two-machines \
   --renderer blend --rate 500 --hand h.toml --device falcon --out "$lab/out"
-expect 'with the options of a demo' called '^lab two-machines --scene .*/scenes/phantom.toml --device falcon --hand h.toml --seconds 2 --size 640x480 --loss 1 --headless --controller-word=--set --controller-word=a.b=1 --controller-word=--rate --controller-word=500 --visualizer-word=--renderer --visualizer-word=blend --out '
+expect 'with the options of a demo' called '^studies two-machines --scene .*/scenes/phantom.toml --device falcon --hand h.toml --seconds 2 --size 640x480 --loss 1 --headless --controller-word=--set --controller-word=a.b=1 --controller-word=--rate --controller-word=500 --visualizer-word=--renderer --visualizer-word=blend --out '
 expect 'and the same results' says '^kept in .*report.json, 1 frame'
 expect 'nothing survives them' nothing_survives
-expect 'a machine that forbids them says so by its exit code' with FAIL_lab=77 kerf_gives 77 demo --two-machines
+expect 'a machine that forbids them says so by its exit code' with FAIL_studies=77 kerf_gives 77 demo --two-machines
 for wrong in --virtual --serve '--port fw' '--hand mouse' '--loss 51' '--loss nan' '--delay-ms 2001'; do
   # shellcheck disable=SC2086  # two words
   expect "two machines exclude $wrong" with DISPLAY=:99 kerf_gives 2 demo --two-machines $wrong

@@ -4,7 +4,7 @@
 # in build/odr, at -O1, since only the linker's comparison counts.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
-programs=(kerf-controller kerf-emulator kerf-visualizer kerf-recorder kerf-record kerf-replay kerf-volume kerf-lab kerf-bridge kerf-arm)
+programs=(kerf-controller kerf-emulator kerf-visualizer kerf-recorder kerf-record kerf-replay kerf-volume kerf-lab kerf-studies kerf-bridge kerf-arm)
 cmake --preset release -B build/odr --log-level=NOTICE -DCMAKE_CXX_FLAGS_RELEASE=-O1 \
   -DCMAKE_CXX_FLAGS='-flto=auto -Wodr' -DCMAKE_EXE_LINKER_FLAGS='-flto=auto -Wodr' \
   -DCMAKE_AR="$(command -v gcc-ar)" -DCMAKE_RANLIB="$(command -v gcc-ranlib)"

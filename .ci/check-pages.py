@@ -20,14 +20,15 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 RIG = ["lab/rig/*"]
 # Page, the command that makes it, the sources of its rows and texts.
 PAGES = {
-    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py", *RIG]),
-    "docs/contact.md": ("./kerf lab extremes --data DIR --page docs/contact.md", ["lab/contact/*", "lab/report/contact.py", *RIG]),
+    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py"]),
+    "docs/contact.md": ("./kerf studies extremes --data DIR --page docs/contact.md",
+                        ["tests/studies/contact/*", "lab/report/contact.py", "tests/rig/*", *RIG]),
     "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*", "lab/report/energy.py", "lab/rig/port_loop.hpp", "controller/law/*"]),
     "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
                           ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*", "lab/report/stability*"]),
     "docs/performance.md": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", "lab/report/kernels.py", *RIG]),
     "docs/pictures.md": ("./kerf bench pictures --page docs/pictures.md", ["visualizer/bench/*", "lab/report/pictures.py"]),
-    "docs/second-machine.md": ("./kerf bench bridge --page docs/second-machine.md", ["lab/bridge/*"]),
+    "docs/second-machine.md": ("./kerf bench bridge --page docs/second-machine.md", ["tests/studies/bridge/*"]),
 }
 # A number comes before a character: 1'000 has no text in it.
 CPP_TOKEN = re.compile(r"""(?P<kept>R"(?P<end>[^(]*)\(.*?\)(?P=end)"|"(?:\\.|[^"\\])*"|\b[0-9][\w.']*|'(?:\\.|[^'\\])*')"""

@@ -7,8 +7,8 @@
 pages=$root/cli/help
 # Commands that another name has, too.
 declare -A same_as=([sweep]='lab sweep' ['bench kernels']='lab bench' ['bench pictures']=visualizer ['bench safety']='lab faults'
-  ['bench bridge']='lab bridge' ['bench stability']='lab ranges')
-of_clones='setup test docs page package stand-in'
+  ['bench bridge']='studies bridge' ['bench stability']='studies ranges')
+of_clones='setup test docs page package stand-in studies'
 
 # commands: those of this script, by the first screen of its help; programs: those that the help has.
 commands() {
@@ -23,7 +23,7 @@ first_screen() {
     return
   fi
   grep -vE "^  \./kerf (${of_clones// /|}) " "$pages/kerf.txt" | sed 's/source <(.*)/bash-completion brings it/; s|\./kerf|kerf|g'
-  echo "Here it is installed: ${of_clones// /, }, lab ablate and bench safety need a clone of its sources."
+  echo "Here it is installed: ${of_clones// /, }, bench safety, bench bridge and bench stability need a clone of its sources."
 }
 
 # read_help NAME [COMMAND]: of a command or program, in `page` the text, in `takes` the value of each option (empty: a flag), in `words`
@@ -179,7 +179,7 @@ judge_all() {
   if [[ $name == bench && -n ${same_as["bench ${1:-}"]:-} ]]; then
     title="bench $1"
     shift
-  elif [[ $name == lab && ${1:-} == ablate ]]; then
+  elif [[ $name == studies && ${1:-} == ablate ]]; then
     return
   fi
   if [[ -n ${same_as[$title]:-} ]]; then read -r name command <<<"${same_as[$title]}"; fi

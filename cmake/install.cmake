@@ -94,7 +94,7 @@ install(DIRECTORY ${completion}/ DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-compl
 # ./kerf looks for all else beside itself, and finds that it is installed.
 set(share ${CMAKE_INSTALL_DATADIR}/kerf)
 install(PROGRAMS kerf DESTINATION ${share})
-install(DIRECTORY cli DESTINATION ${share})
+install(DIRECTORY cli DESTINATION ${share} PATTERN kerf-studies.txt EXCLUDE PATTERN kerf-visualizer-monkey.txt EXCLUDE)
 install(DIRECTORY demo DESTINATION ${share} PATTERN __pycache__ EXCLUDE)
 install(PROGRAMS .ci/doctor.sh DESTINATION ${share}/.ci)
 install(CODE "file(CREATE_LINK ../${share}/kerf
@@ -102,7 +102,9 @@ install(CODE "file(CREATE_LINK ../${share}/kerf
 install(DIRECTORY scenes DESTINATION ${share} PATTERN "ct.*" EXCLUDE PATTERN .gitignore EXCLUDE)  # who has a CT keeps it
 install(DIRECTORY ros DESTINATION ${share})  # for a workspace of ROS 2
 install(DIRECTORY hil/faults DESTINATION ${share}/hil)
-install(DIRECTORY lab/report DESTINATION ${share}/lab PATTERN __pycache__ EXCLUDE)
+# Pages of kerf-studies are made in a clone.
+install(DIRECTORY lab/report DESTINATION ${share}/lab PATTERN __pycache__ EXCLUDE
+  PATTERN contact.py EXCLUDE PATTERN burs.py EXCLUDE)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN .site EXCLUDE)  # the make of the site
 install(FILES CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})

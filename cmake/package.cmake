@@ -24,7 +24,7 @@ set(CPACK_COMPONENTS_ALL kerf development)
 set(CPACK_DEBIAN_KERF_PACKAGE_NAME kerf)
 set(CPACK_DEBIAN_KERF_PACKAGE_SHLIBDEPS ON)
 # What is no linked library: OpenGL is loaded at run time, and demo/ is Python. apt installs what is recommended, too, so that what
-# only some need is suggested: plots (forces.svg), videos, rights to devices, completion, certificates of demo --two-machines.
+# only some need is suggested: plots (forces.svg), videos, rights to devices, completion, certificates for kerf bridge.
 set(CPACK_DEBIAN_KERF_PACKAGE_DEPENDS "libegl1, libgl1, libgl1-mesa-dri, python3")
 set(CPACK_DEBIAN_KERF_PACKAGE_SUGGESTS "python3-matplotlib, ffmpeg, udev, bash-completion, openssl")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME kerf-dev)

@@ -88,9 +88,11 @@ class Demo:
                 self.out.close()
 
     def build(self):
+        if self.options.two_machines and not os.path.exists(os.path.join(self.root, "CMakeLists.txt")):
+            raise Refusal("--two-machines: this kerf is installed; a clone of its sources has that")
         names = ["controller", "emulator", "visualizer", "recorder", "record"]
         names += ["arm"] * (self.options.port == "arm") + ["stand-in"] * self.options.stand_in
-        names += ["bridge"] * (self.options.serve or self.options.two_machines) + ["lab"] * self.options.two_machines
+        names += ["bridge"] * (self.options.serve or self.options.two_machines) + ["studies"] * self.options.two_machines
         code = subprocess.run([self.kerf, "_programs", *names], check=False).returncode
         if code:
             sys.exit(code if code > 0 else 128 - code)
@@ -127,21 +129,21 @@ class Demo:
         return self.finish(failed, cut)
 
     def run_two_machines(self):
-        """`kerf-lab two-machines` makes the networks and starts all parts on them."""
+        """`kerf-studies two-machines` makes the networks and starts all parts on them."""
         options = self.options
         words = [f"--controller-word={word}" for word in [*options.volume, *(["--rate", options.rate] if options.rate else [])]]
         look = [*options.look, *options.screen, *(["--record", options.record] if options.record else []),
                 *(["--sheet", options.sheet] if options.sheet else [])]
         words += [f"--visualizer-word={word}" for word in look]
         hand = ["--hand", options.hand] if options.hand else []
-        self.controller = self.emulator = self.processes.start("lab", [
+        self.controller = self.emulator = self.processes.start("studies", [
             "two-machines", "--scene", self.scene, "--device", options.device, *hand, "--seconds", options.seconds,
             *(["--size", options.size] if options.size else []), *options.link, *["--headless"] * options.headless, *words,
             *(["--out", self.results] if self.out else [])])  # it speaks for itself
         code = self.controller.wait()
         if code == 77 or code == 2:
             return self.code_of_signal or code
-        if self.code_of_signal is None and crashed("lab", exit_code(self.controller)):
+        if self.code_of_signal is None and crashed("studies", exit_code(self.controller)):
             code = 1
         self.finishing = True
         code = self.keep(code)

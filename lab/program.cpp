@@ -9,16 +9,9 @@
 
 namespace kerf {
 
-int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
-  CommandLine app("Measures kerf without a device.", "kerf-lab", "kerf-lab " KERF_VERSION);
-  app.footer("Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.");
-  const std::array commands{
-      make_bench_command(app),        make_accuracy_command(app), make_bridge_command(app),
-      make_two_machines_command(app), make_burs_command(app),     make_energy_command(app),
-      make_extremes_command(app),     make_faults_command(app),   make_law_command(app),
-      make_ranges_command(app),       make_sweep_command(app),    make_zwidth_command(app),
-      make_merge_command(app),
-  };
+int run_chosen(CommandLine& app, std::span<const std::unique_ptr<LabCommand>> commands,
+               const char* program, int argc, const char* const* argv, std::ostream& out,
+               std::ostream& err) {
   try {
     int code = 0;
     if (app.parse(argc, argv, out)) {
@@ -28,9 +21,20 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
     }
     return code;
   } catch (...) {
-    err << "kerf-lab: " << failure_text() << '\n';
+    err << program << ": " << failure_text() << '\n';
     return 2;
   }
+}
+
+int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
+  CommandLine app("Measures kerf without a device.", "kerf-lab", "kerf-lab " KERF_VERSION);
+  app.footer("Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.");
+  const std::array commands{
+      make_zwidth_command(app),   make_sweep_command(app),  make_faults_command(app),
+      make_accuracy_command(app), make_energy_command(app), make_law_command(app),
+      make_bench_command(app),    make_merge_command(app),
+  };
+  return run_chosen(app, commands, "kerf-lab", argc, argv, out, err);
 }
 
 }  // namespace kerf

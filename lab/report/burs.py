@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sheet of burs (`kerf lab burs --svg`): every head from the side at the sizes that are sold most, all at one scale. JSON:
+"""The sheet of burs (`kerf studies burs --svg`): every head from the side at the sizes that are sold most, all at one scale. JSON:
 
     out_mm                      length of head and neck that a scene has out of the handpiece
     heads                       {number, name, sizes}: sizes {tenths, neck_mm, length_mm, outline}: diameter in 0.1 mm, radius of

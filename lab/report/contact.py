@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of contact (docs/contact.md) and its plots. JSON of `kerf lab extremes --report`:
+"""The page of contact (docs/contact.md) and its plots. JSON of `kerf studies extremes --report`:
 
     provenance                  day, machine and compiler of the run
     rows                        {group, name, value, unit, limit, aim, pass, skipped}: value null if it was not measured, and
@@ -15,7 +15,7 @@ import text
 ABOUT = """\
 # Contact
 
-Made by `./kerf lab extremes --page docs/contact.md`; every figure comes from one run, nothing is typed by
+Made by `./kerf studies extremes --page docs/contact.md`; every figure comes from one run, nothing is typed by
 hand. A run repeats bit for bit, but for the times of ticks. `--report` writes the rows as JSON, `--only` measures
 some groups of them. The command exits with 1 if a limit is not kept.
 

@@ -3,13 +3,14 @@
 
 #include <iosfwd>
 #include <memory>
+#include <span>
 
 #include "shared/text/command_line.hpp"
 
 namespace kerf {
 
-/// A subcommand of `kerf-lab`: its options and its run. It declares its options when it is made and
-/// lives as long as the program parses.
+/// A subcommand of `kerf-lab` or `kerf-studies`: its options and its run. It declares its options
+/// when it is made and lives as long as the program parses.
 class LabCommand {
  public:
   virtual ~LabCommand() = default;
@@ -30,19 +31,21 @@ class LabCommand {
   Arguments app_;
 };
 
+/// Parses `argc` and `argv`, runs the chosen one of `commands`, and returns its exit code; 2 with
+/// one line on `err`, behind the program's name, if the words or the set-up are wrong.
+[[nodiscard]] int run_chosen(CommandLine& app,
+                             std::span<const std::unique_ptr<LabCommand>> commands,
+                             const char* program, int argc, const char* const* argv,
+                             std::ostream& out, std::ostream& err);
+
 // One factory for each command; its class is private to its source file.
 [[nodiscard]] std::unique_ptr<LabCommand> make_accuracy_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_bench_command(Arguments& program);
-[[nodiscard]] std::unique_ptr<LabCommand> make_bridge_command(Arguments& program);
-[[nodiscard]] std::unique_ptr<LabCommand> make_burs_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_energy_command(Arguments& program);
-[[nodiscard]] std::unique_ptr<LabCommand> make_extremes_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_faults_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_law_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_merge_command(Arguments& program);
-[[nodiscard]] std::unique_ptr<LabCommand> make_ranges_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_sweep_command(Arguments& program);
-[[nodiscard]] std::unique_ptr<LabCommand> make_two_machines_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_zwidth_command(Arguments& program);
 
 /// `kerf-lab`: measurements without a device. Returns the exit code: 0 fine, 2 bad input or set-up.

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/bridge/two_machines.hpp"
+#include "tests/studies/bridge/two_machines.hpp"
 
 using kerf::two_machines::Link;
 using kerf::two_machines::LinkSettings;

@@ -32,10 +32,10 @@ def known_options(words):
     """Options of `./kerf WORDS...`: those of kerf itself, or of a program and its subcommand."""
     if words[0] in ("demo", "test", "bench", "completion", "doctor", "setup", "docs", "page", "package", "sweep", "stand-in"):
         text = help_of(root / "kerf", words[0]) + (help_of(bin_folder / "kerf-lab", "sweep") if words[0] == "sweep" else "")
-        text += help_of(bin_folder / "kerf-lab", "ranges") + help_of(bin_folder / "kerf-lab", "faults")
+        text += help_of(bin_folder / "kerf-studies", "ranges") + help_of(bin_folder / "kerf-lab", "faults")
         text += help_of(bin_folder / "kerf-lab", "bench") + help_of(bin_folder / "kerf-visualizer")
-    elif words[:2] == ["lab", "ablate"]:
-        text = help_of(root / "kerf", "lab", "ablate")
+    elif words[:2] == ["studies", "ablate"]:
+        text = help_of(root / "kerf", "studies", "ablate")
     else:
         text = help_of(bin_folder / ("kerf-" + words[0]))
         if len(words) > 1 and re.fullmatch(r"[a-z][a-z-]*", words[1]):

@@ -46,8 +46,8 @@ NOT_HERE = {
     "runs in the test docs_tutorial": ["tutorial.md: "],
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [
-        "./kerf test", "safety.md: ./kerf lab", "./kerf lab ranges", ".ci/check-determinism.sh", ".ci/check-bare-metal.sh", "./kerf bench",
-        "KERF_KILLS=", "KERF_WRITE_PAGE=", "./kerf lab ablate"],
+        "./kerf test", "safety.md: ./kerf lab", "./kerf studies ranges", ".ci/check-determinism.sh", ".ci/check-bare-metal.sh", "./kerf bench",
+        "KERF_KILLS=", "KERF_WRITE_PAGE=", "./kerf studies ablate"],
     "holds a core for a minute; with other options it runs here or in the tests lab and examples_python": [
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
         "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab merge", "./kerf sweep"],
@@ -55,7 +55,7 @@ NOT_HERE = {
     "installs packages and builds": ["./kerf setup$", "./kerf page"],
     "serves until it is ended; the test web has a server of its own": ["python3 -m http.server"],
     "measures for minutes; the tests of lab run parts of it": [
-        "./kerf lab accuracy --page", "./kerf lab extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all"],
+        "./kerf lab accuracy --page", "./kerf studies extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all"],
     "needs network namespaces; the test bridge_net does the same": ["./kerf demo --two-machines"],
     "names a program or an option, and is no whole command": [
         "./kerf controller$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",

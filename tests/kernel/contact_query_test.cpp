@@ -16,10 +16,10 @@
 
 #include "controller/kernel/point_shell/free_path.hpp"
 #include "controller/plan/tables/free_brick_map.hpp"
-#include "lab/rig/geometry.hpp"
-#include "lab/rig/tool_meshes.hpp"
 #include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
+#include "tests/rig/geometry.hpp"
+#include "tests/rig/tool_meshes.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

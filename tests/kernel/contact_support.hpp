@@ -4,8 +4,8 @@
 #include <array>
 #include <cstddef>
 
-#include "lab/rig/contact_rig.hpp"
 #include "tests/kernel/support.hpp"
+#include "tests/rig/contact_rig.hpp"
 
 /// Tools and bodies of known shape for the tests of the swept contact; all lengths in units.
 namespace kerf::test {

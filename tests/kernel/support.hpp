@@ -14,7 +14,7 @@
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/overlap_methods.hpp"
 #include "controller/kernel/sampling.hpp"
-#include "lab/rig/geometry.hpp"
+#include "tests/rig/geometry.hpp"
 
 /// Analytic volumes, tools and poses for the kernel tests.
 namespace kerf::test {

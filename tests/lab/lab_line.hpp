@@ -9,22 +9,27 @@
 
 namespace kerf::test {
 
-/// What `kerf-lab` returned and printed.
+/// What a program of commands returned and printed.
 struct LabAnswer {
   int code;
   std::string out, err;
 };
 
-/// `kerf-lab` with the words of `line`, in this process.
-inline LabAnswer lab(const std::string& line) {
-  std::vector<std::string> words{"kerf-lab"};
+/// A program, by its function, with the words of `line`, in this process.
+inline LabAnswer answer_of(decltype(run_lab)& run, const char* name, const std::string& line) {
+  std::vector<std::string> words{name};
   std::istringstream in(line);
   for (std::string word; in >> word;) words.push_back(word);
   std::vector<const char*> argv;
   for (const std::string& word : words) argv.push_back(word.c_str());
   std::ostringstream out, err;
-  const int code = run_lab(static_cast<int>(argv.size()), argv.data(), out, err);
+  const int code = run(static_cast<int>(argv.size()), argv.data(), out, err);
   return {code, out.str(), err.str()};
+}
+
+/// `kerf-lab` with the words of `line`.
+inline LabAnswer lab(const std::string& line) {
+  return answer_of(run_lab, "kerf-lab", line);
 }
 
 /// The cases of a table in one text, `a; b; c`.

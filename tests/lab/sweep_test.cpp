@@ -357,21 +357,6 @@ TEST_CASE("a sweep that is killed takes its programs with it") {
   CHECK(eventually([&] { return processes_of(folder.path()) == 0; }, 20s));
 }
 
-TEST_CASE("ranges that is asked to end leaves nothing behind") {
-  const TemporaryFolder folder;
-  setenv("TMPDIR", folder.path().c_str(), 1);
-  Process process({kBin + "/kerf-lab", "ranges", "--combinations", "0", "--hours", "24"},
-                  folder / "log");
-  unsetenv("TMPDIR");
-  const auto files = [&] {
-    return std::distance(std::filesystem::directory_iterator(folder.path()), {});
-  };
-  REQUIRE(eventually([&] { return files() == 2; }, 60s));
-  process.signal(SIGTERM);
-  CHECK(process.wait() == 130);
-  CHECK(files() == 1);  // the log
-}
-
 TEST_CASE(
     "a run of a sweep is the demo's, bit by bit; a run that fails is a row with its message") {
   const TemporaryFolder folder;

@@ -13,7 +13,7 @@
 #include "controller/load/load_scene.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "lab/rig/tool_meshes.hpp"
+#include "tests/rig/tool_meshes.hpp"
 #include "tests/scene/support.hpp"
 #include "tests/support/property.hpp"
 #include "tests/support/real_data.hpp"

@@ -7,9 +7,9 @@
 #include <doctest/doctest.h>
 
 #include "controller/plan/air_speed.hpp"
-#include "lab/rig/contact_motions.hpp"
-#include "lab/rig/contact_rig.hpp"
 #include "tests/case_count.hpp"
+#include "tests/rig/contact_motions.hpp"
+#include "tests/rig/contact_rig.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

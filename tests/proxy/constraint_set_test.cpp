@@ -3,7 +3,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/geometry.hpp"
+#include "tests/rig/geometry.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

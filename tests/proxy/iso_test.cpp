@@ -6,8 +6,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/contact_motions.hpp"
 #include "tests/case_count.hpp"
+#include "tests/rig/contact_motions.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -7,8 +7,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/contact_rig.hpp"
 #include "tests/case_count.hpp"
+#include "tests/rig/contact_rig.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -5,8 +5,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/contact_rig.hpp"
 #include "tests/proxy/support.hpp"
+#include "tests/rig/contact_rig.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

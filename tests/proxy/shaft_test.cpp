@@ -8,8 +8,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/contact_rig.hpp"
-#include "lab/rig/geometry.hpp"
+#include "tests/rig/contact_rig.hpp"
+#include "tests/rig/geometry.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -6,8 +6,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/contact_motions.hpp"
-#include "lab/rig/contact_rig.hpp"
+#include "tests/rig/contact_motions.hpp"
+#include "tests/rig/contact_rig.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

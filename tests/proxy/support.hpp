@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "controller/kernel/proxy/contact_space.hpp"
-#include "lab/rig/geometry.hpp"
+#include "tests/rig/geometry.hpp"
 
 // Contact fields in closed form: the truth that proxy and sweep are tested against.
 

@@ -4,7 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/contact_space.hpp"
-#include "lab/rig/geometry.hpp"
+#include "tests/rig/geometry.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -60,7 +60,7 @@ if options_of_help("stand-in") != taken:
 
 # Each command of the script has a page and stands on the first screen, and each page is one of a command.
 script = (root / "kerf").read_text(encoding="utf-8")
-cases = set(re.findall(r"^  ([a-z][a-z-]*)\)", script.rpartition("\ncase $command in\n")[2], re.M)) - {"help", "lab"}
+cases = set(re.findall(r"^  ([a-z][a-z-]*)\)", script.rpartition("\ncase $command in\n")[2], re.M)) - {"help", "lab", "studies"}
 first = (pages / "kerf.txt").read_text(encoding="utf-8")
 shown = set(re.findall(r"^  \./kerf ([a-z-]+) ", first, re.M))
 have = {page.stem for page in pages.glob("*.txt") if not page.stem.startswith("kerf")} | {"sweep"}  # of kerf-lab

@@ -62,7 +62,7 @@ expect 'that of a program' gives 0 volume --version
 expect 'is the same' begins 'kerf 0.'
 
 # Each command and program has its own help, by both ways, and no other.
-for command in $(sed -nE 's|^  \./kerf ([a-z-]+) .*|\1|p' "$lab/first") $(sed -n 's/.*any program: //p' "$lab/first") 'lab zwidth' 'volume info' 'bench kernels'; do
+for command in $(sed -nE 's|^  \./kerf ([a-z-]+) .*|\1|p' "$lab/first") $(sed -n 's/.*any program: //p' "$lab/first") 'lab zwidth' 'studies ranges' 'volume info' 'bench kernels' 'bench bridge'; do
   # shellcheck disable=SC2086
   expect "help $command" gives 0 help $command
   cp "$lab/said" "$lab/page"
@@ -86,7 +86,7 @@ refused --versoin '--versoin: unknown option; did you mean --version? see ./kerf
 refused --fast '--fast: unknown option; see ./kerf --help'
 refused '--version now' '--version: now: unknown; leave it out'
 refused polish "polish: unknown; known are $(sed -nE 's|^  \./kerf ([a-z-]+) .*|\1|p' "$lab/first" | paste -sd ' ') \
-arm bridge controller emulator lab record recorder replay visualizer-monkey visualizer volume"
+arm bridge controller emulator lab record recorder replay studies visualizer-monkey visualizer volume"
 refused kerf "kerf: unknown; known are $(sed 's/.*known are //' "$lab/said")"
 refused ../kerf "../kerf: unknown; known are $(sed 's/.*known are //' "$lab/said")"
 refused 'setup foo' 'setup: foo: unknown; see ./kerf setup --help'
@@ -122,6 +122,8 @@ refused 'volume' 'volume: no command; take import info crop resample phantom'
 refused 'volume info --windw 1,2' 'volume info: --windw: unknown; did you mean --window? see ./kerf volume info --help'
 refused 'volume import a --out' 'volume import: --out: no value; see ./kerf volume import --help'
 refused 'lab zwidht' 'lab: zwidht: unknown; did you mean zwidth? see ./kerf lab --help'
+refused 'lab extremes' 'lab: extremes: unknown; see ./kerf lab --help'
+refused 'studies extrems' 'studies: extrems: unknown; did you mean extremes? see ./kerf studies --help'
 refused 'visualizer --renderr iso' 'visualizer: --renderr: unknown; did you mean --renderer? see ./kerf visualizer --help'
 
 # What is right goes on.

@@ -9,8 +9,8 @@
 
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/crop_resample.hpp"
-#include "lab/rig/cutting_hand.hpp"
 #include "tests/case_count.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

@@ -13,8 +13,8 @@
 #include "controller/loop/allocation_counter.hpp"
 #include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/cutting_hand.hpp"
 #include "tests/case_count.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

@@ -13,7 +13,7 @@
 #include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/phantom.hpp"
-#include "lab/rig/cutting_hand.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

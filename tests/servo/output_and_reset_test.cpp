@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/cutting_hand.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

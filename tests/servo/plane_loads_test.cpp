@@ -7,8 +7,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/cutting_hand.hpp"
 #include "shared/numeric/linear_algebra.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

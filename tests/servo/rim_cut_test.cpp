@@ -7,8 +7,8 @@
 #include <doctest/doctest.h>
 
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/cutting_hand.hpp"
 #include "tests/case_count.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

@@ -9,7 +9,7 @@
 
 #include "controller/loop/allocation_counter.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/cutting_hand.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

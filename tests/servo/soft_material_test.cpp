@@ -9,8 +9,8 @@
 
 #include "controller/load/load_scene.hpp"
 #include "controller/scene/scene_presets.hpp"
-#include "lab/rig/contact_rig.hpp"
-#include "lab/rig/cutting_hand.hpp"
+#include "tests/rig/contact_rig.hpp"
+#include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

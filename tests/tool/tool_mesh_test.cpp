@@ -20,9 +20,9 @@
 #include "controller/tool/inner_samples.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/contact_rig.hpp"
-#include "lab/rig/tool_meshes.hpp"
 #include "shared/numeric/linear_algebra.hpp"
+#include "tests/rig/contact_rig.hpp"
+#include "tests/rig/tool_meshes.hpp"
 #include "tests/scene/support.hpp"
 #include "tests/tool/stl_support.hpp"
 

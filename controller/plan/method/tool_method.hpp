@@ -51,8 +51,8 @@ struct UnitCosts {
                                std::string_view runs_it);
 
 /// The queries of the swept proxy: samples that are read, and work that counts like them. They cost
-/// the same beside every method. The price is that of the costliest ticks that `kerf lab extremes`
-/// finds, of tools of 500 to 1100 samples, and of queries inside of the solid.
+/// the same beside every method. The price is that of the costliest ticks that `kerf studies
+/// extremes` finds, of tools of 500 to 1100 samples, and of queries inside of the solid.
 [[nodiscard]] StageCost query_stage(std::uint64_t samples, std::string_view runs_it);
 
 /// The stages of cutting by force, `list` and `spend`, the same beside every method: groups of
