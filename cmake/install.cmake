@@ -142,3 +142,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/kerf-config-version.cmake
 install(FILES ${PROJECT_BINARY_DIR}/kerf-config.cmake ${PROJECT_BINARY_DIR}/kerf-config-version.cmake
   DESTINATION ${package})
 include(cmake/package.cmake)
+
+# What is installed, and the stand-ins of a clone: all that ./kerf setup builds.
+add_custom_target(products)
+add_dependencies(products ${programs} manuals kerf ${main_objects} stand-in)

@@ -32,7 +32,10 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 file(GLOB sources CONFIGURE_DEPENDS *.cpp)  # so that ninja looks for new files first, as it does for kerf
 foreach(name controller emulator visualizer recorder record volume)
   add_executable(kerf-${name} ${sources})
+  list(APPEND programs kerf-${name})
 endforeach()
+add_custom_target(products DEPENDS ${programs})
+add_executable(test_all ${sources})
 PROJECT
 # Asked for more than two words it falls, as a library without memory lets it.
 cat >"$clone/main.cpp" <<'MAIN'
@@ -44,6 +47,8 @@ int main(int count, char**) {
 }
 MAIN
 expect 'the clone builds' "$clone/kerf" setup >"$lab/said" 2>&1
+expect 'its programs' test -x "$clone/build/release/bin/kerf-volume"
+expect 'and no test' test ! -e "$clone/build/release/bin/test_all"
 # gives CODE COMMAND...: and what it says lies in $lab/said.
 gives() {
   local code=0
