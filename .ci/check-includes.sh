@@ -37,7 +37,7 @@ lab/run lab/rig lab/accuracy lab/bench lab/stability lab/safety lab/commands lab
 face
 
 visualizer/scene visualizer/scene/simd visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
-visualizer/redraw visualizer/render visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench visualizer/monkey
+visualizer/redraw visualizer/render visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench
 
 bridge/wire bridge/stream bridge/foxglove bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "tests/studies/monkey/test_controller.hpp"
 #include "visualizer/app/options.hpp"
 #include "visualizer/app/window_run.hpp"
 #include "visualizer/gl/context.hpp"
-#include "visualizer/monkey/test_controller.hpp"
 
 namespace kerf {
 

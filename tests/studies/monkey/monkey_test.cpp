@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/monkey/monkey.hpp"
+#include "tests/studies/monkey/monkey.hpp"
 
 #include <filesystem>
 #include <memory>

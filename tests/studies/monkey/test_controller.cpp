@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "visualizer/monkey/test_controller.hpp"
+#include "tests/studies/monkey/test_controller.hpp"
 
 #include <algorithm>
 #include <cmath>
