@@ -93,16 +93,22 @@ bool ArmExchange::publish(const ArmReading& reading, std::int64_t now_ns) noexce
   return true;
 }
 
-std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
+std::optional<TimedCommand> ArmExchange::current(std::int64_t now_ns) noexcept {
   const auto newest = page_.newest();
-  if (!newest || !newest->command.force_on) return {};
+  ticket_ = newest ? newest->ticket : 0;
+  if (!newest || in_lockstep_) return newest;
   // A command written during this exchange may be slightly newer than `now_ns`. A later time is
   // invalid.
   constexpr std::int64_t kAheadNs = 1'000'000;
-  if (newest->at_ns <= now_ns - command_life_ns_ || newest->at_ns > now_ns + kAheadNs) {
-    if (last_force_n_ != Vec3{}) ++counts_.expired;
-    return {};
-  }
+  const bool is_current =
+      newest->at_ns > now_ns - command_life_ns_ && newest->at_ns <= now_ns + kAheadNs;
+  return is_current ? newest : std::nullopt;
+}
+
+std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
+  const auto newest = current(now_ns);
+  if (!newest && ticket_ != 0 && last_force_n_ != Vec3{}) ++counts_.expired;
+  if (!newest || !newest->command.force_on) return {};
   Vec3 force_n;
   for (std::size_t i = 0; i < 3; ++i) {
     force_n[i] = newest->command.force_mn[i] * cartesian::kNewtonsPerCount;
@@ -114,6 +120,31 @@ std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
   }
   counts_.command_age.record(now_ns - newest->at_ns);
   return force_n;
+}
+
+void ArmExchange::publish(const CartesianReport& report) noexcept {
+  CartesianReport sent = report;
+  sent.powered = report.powered && !is_let_go_.load();
+  page_.publish(sent, clock_());
+  published_.fetch_add(1);
+}
+
+std::optional<TimedCommand> ArmExchange::command() noexcept {
+  const std::int64_t now_ns = clock_();
+  const auto newest = current(now_ns);
+  frames_.fetch_add(1);
+  if (is_let_go_.load()) {
+    count_zero_frame(now_ns);
+    return std::nullopt;
+  }
+  if (newest && newest->command.force_on) ++counts_.forced;
+  if (newest && !in_lockstep_) counts_.command_age.record(now_ns - newest->at_ns);
+  return newest;
+}
+
+void ArmExchange::set_lockstep(int rate_hz) noexcept {
+  in_lockstep_ = true;
+  page_.set_lockstep(rate_hz);
 }
 
 void ArmExchange::fail(std::uint32_t code) noexcept {

@@ -30,11 +30,12 @@ struct ArmReading {
     const std::array<double, 3>& x, const std::array<double, 3>& y,
     const std::array<double, 3>& z) noexcept;
 
-/// The exchange between the frames of a vendor's library and the page: in each frame it publishes
-/// one reading and returns one force.
+/// The exchange between the frames of a device and the page: in each frame it publishes one reading
+/// and returns one force.
 ///
-/// Only the thread of the frames calls `turn`, which never blocks, allocates or throws. Any thread
-/// may call the rest, unless noted.
+/// Only the thread of the frames calls `turn`, or in its place `publish`, `command` and
+/// `await_command`; none of them allocates or throws, and only the last one blocks. Any thread may
+/// call the rest, unless noted.
 class ArmExchange {
  public:
   using Clock = std::int64_t() noexcept;
@@ -59,8 +60,33 @@ class ArmExchange {
   /// its force stays (docs/safety.md, "report lost").
   [[nodiscard]] std::array<double, 3> turn(const std::optional<ArmReading>& reading) noexcept;
 
+  // A frame in two halves, for a device whose frames are messages to a service, which has limits of
+  // its own (ServiceArm).
+
+  /// Publishes the report as it is, but for its number.
+  void publish(const CartesianReport& report) noexcept;
+  /// The command of this frame: the newest one; nothing if there is none, if it has expired, and
+  /// after `let_go`.
+  [[nodiscard]] std::optional<TimedCommand> command() noexcept;
+  /// Sleeps until there is a newer command than that of the last frame, at most until `until_ns`.
+  /// Whether there is.
+  [[nodiscard]] bool await_command(std::int64_t until_ns) const noexcept {
+    return page_.await_command(ticket_, until_ns);
+  }
+  /// The thread of the frames lives, though it has none now.
+  void beat() noexcept { beats_.fetch_add(1); }
+
+  /// The device runs in lock-step at this rate: commands do not expire, and after `let_go` no
+  /// frame is needed, since none comes unasked. Before the first frame.
+  void set_lockstep(int rate_hz) noexcept;
+  [[nodiscard]] bool in_lockstep() const noexcept { return in_lockstep_; }
+
   /// Zero force from the next frame on. Cannot be undone.
-  void let_go() noexcept { is_let_go_.store(true); }
+  void let_go() noexcept {
+    is_let_go_.store(true);
+    if (in_lockstep_) is_finished_.store(true);
+  }
+  [[nodiscard]] bool is_let_go() const noexcept { return is_let_go_.load(); }
   /// True after enough frames of zero force since then.
   [[nodiscard]] bool finished() const noexcept { return is_finished_.load(); }
 
@@ -74,8 +100,10 @@ class ArmExchange {
 
   /// The clock that the exchange uses.
   [[nodiscard]] std::int64_t now_ns() const noexcept { return clock_(); }
-  /// Number of frames so far, as a heartbeat.
+  /// Number of frames so far.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(); }
+  /// Changes while the thread of the frames lives.
+  [[nodiscard]] std::uint64_t heartbeat() const noexcept { return frames_.load() + beats_.load(); }
   [[nodiscard]] std::uint64_t published() const noexcept { return published_.load(); }
 
   /// To be read after the frames have ended.
@@ -91,6 +119,7 @@ class ArmExchange {
 
  private:
   [[nodiscard]] std::array<double, 3> commanded(std::int64_t now_ns) noexcept;
+  [[nodiscard]] std::optional<TimedCommand> current(std::int64_t now_ns) noexcept;
   void count_zero_frame(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool publish(const ArmReading& reading, std::int64_t now_ns) noexcept;
 
@@ -101,7 +130,9 @@ class ArmExchange {
   Clock* clock_;
   std::atomic<bool> is_let_go_{false}, is_finished_{false};
   std::atomic<std::uint32_t> failure_{0};
-  std::atomic<std::uint64_t> frames_{0}, published_{0};
+  std::atomic<std::uint64_t> frames_{0}, beats_{0}, published_{0};
+  bool in_lockstep_ = false;
+  std::uint64_t ticket_ = 0;  ///< of the last frame's command; 0: none
   std::array<double, 3> last_force_n_{};
   bool is_homed_ = false;  ///< by the newest reading
   int zero_frames_ = 0;    ///< since `let_go`

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arm/guard.hpp"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <iostream>
 #include <new>
 #include <stdexcept>
@@ -13,6 +17,7 @@
 
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -28,6 +33,51 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 constexpr int kFailed = 2;
 
+/// What the child leaves lies in this pair of sockets: written at one end, and taken back by the
+/// child or taken by the guard at the other. A socket that lies there stays open, whoever ends.
+struct LastWords {
+  int write = -1, read = -1;
+};
+LastWords last_words;
+
+void make_last_words() noexcept {
+  std::array<int, 2> ends{-1, -1};
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()) == 0) {
+    last_words = {ends[0], ends[1]};
+  }
+}
+
+/// Takes what lies there, oldest first; false if nothing does. The socket is the caller's.
+bool take_last_word(int& socket, std::array<char, 512>& bytes, std::size_t& size) noexcept {
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  iovec part{bytes.data(), bytes.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  const ssize_t got = recvmsg(last_words.read, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+  const cmsghdr* const head = CMSG_FIRSTHDR(&message);
+  if (got <= 0 || head == nullptr || head->cmsg_type != SCM_RIGHTS) return false;
+  std::memcpy(&socket, CMSG_DATA(head), sizeof socket);
+  size = static_cast<std::size_t>(got);
+  return true;
+}
+
+/// The child has ended. True if a last message has left.
+bool say_last_words() noexcept {
+  int socket = -1;
+  std::array<char, 512> bytes;
+  std::size_t size = 0;
+  bool is_said = false;
+  while (take_last_word(socket, bytes, size)) {
+    is_said =
+        send(socket, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL) == static_cast<ssize_t>(size);
+    close(socket);
+  }
+  return is_said;
+}
+
 void share_the_mark() {
   void* const page = mmap(nullptr, sizeof(std::atomic<bool>), PROT_READ | PROT_WRITE,
                           MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -37,11 +87,16 @@ void share_the_mark() {
 
 /// Prints the line of an end that the child could not report; its exit code.
 int code_of_end(const char* program, int status) {
+  const bool is_said = say_last_words();
   if (WIFEXITED(status) && *told.load()) return WEXITSTATUS(status);
   std::string line;
+  const char* cure = kUnplug;
   if (WIFEXITED(status)) {
     line = "the vendor's library has ended the program by _exit(" +
            std::to_string(WEXITSTATUS(status)) + ")";
+  } else if (WTERMSIG(status) == SIGKILL && is_said) {
+    line = "killed; the device's service was given zero force";
+    cure = "; start kerf-arm again";
   } else if (WTERMSIG(status) == SIGKILL) {
     line = "killed, so the device was not closed and may keep its last force";
   } else {
@@ -49,7 +104,7 @@ int code_of_end(const char* program, int status) {
     line = "the vendor's library, or kerf-arm in it, has crashed (SIG" +
            std::string(name != nullptr ? name : "?") + ")";
   }
-  std::fprintf(stderr, "%s: %s%s\n", program, line.c_str(), kUnplug);
+  std::fprintf(stderr, "%s: %s%s\n", program, line.c_str(), cure);
   return kFailed;
 }
 
@@ -85,6 +140,7 @@ int watch(const char* program, pid_t child, const sigset_t& watched) {
 
 int run_guarded(const char* program, const std::function<int()>& work) {
   share_the_mark();
+  make_last_words();
   static_cast<void>(
       std::signal(SIGCHLD, SIG_DFL));  // if it is ignored, nothing is left to wait for
   const sigset_t asking = asking_signals(), ends = ends_of_user();
@@ -107,6 +163,29 @@ int run_guarded(const char* program, const std::function<int()>& work) {
   const int code = watch(program, child, watched);
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
   return code;
+}
+
+void leave_last_word(int socket, std::string_view bytes) noexcept {
+  if (told.load() == nullptr) return;
+  int former = -1;
+  std::array<char, 512> ignored;
+  std::size_t size = 0;
+  while (take_last_word(former, ignored, size)) close(former);
+  if (socket < 0 || bytes.empty() || bytes.size() > ignored.size()) return;
+  std::copy(bytes.begin(), bytes.end(), ignored.begin());
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  iovec part{ignored.data(), bytes.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  cmsghdr* const head = CMSG_FIRSTHDR(&message);
+  head->cmsg_level = SOL_SOCKET;
+  head->cmsg_type = SCM_RIGHTS;
+  head->cmsg_len = CMSG_LEN(sizeof socket);
+  std::memcpy(CMSG_DATA(head), &socket, sizeof socket);
+  static_cast<void>(sendmsg(last_words.write, &message, MSG_DONTWAIT | MSG_NOSIGNAL));
 }
 
 void end_is_told() noexcept {

@@ -24,6 +24,7 @@ namespace {
 // For the signal handler.
 std::atomic<ArmPageAdapter*> page_of_crash{nullptr};
 const char* program_of_crash = "";
+WatchWords words_of_crash;
 
 /// A line of text that a signal handler may compose: it does not allocate.
 class Line {
@@ -53,8 +54,6 @@ void print(const char* program, const char* reason, const char* text) noexcept {
   }
 }
 
-/// Does not stop the device, because no call of a library that has crashed or exits is safe. The
-/// device keeps its last force unless its own watchdog ends that.
 [[noreturn]] void end_by_the_library(const Line& line) {
   if (ArmPageAdapter* page = page_of_crash) page->set_state(ArmState::failed, line.text());
   print(program_of_crash, "", line.text());
@@ -65,8 +64,8 @@ void print(const char* program, const char* reason, const char* text) noexcept {
 void on_crash(int number) {
   const char* const name = sigabbrev_np(number);
   Line line;
-  line << "the vendor's library, or kerf-arm in it, has crashed (SIG" << (name ? name : "?") << ")"
-       << kUnplug;
+  line << words_of_crash.crashed << " has crashed (SIG" << (name ? name : "?") << ")"
+       << words_of_crash.cure;
   end_by_the_library(line);
 }
 
@@ -74,14 +73,15 @@ void on_crash(int number) {
 void on_exit_of_library(int code, void*) {
   if (page_of_crash == nullptr) return;
   Line line;
-  line << "the vendor's library has ended the program by exit(" << code << ")" << kUnplug;
+  line << words_of_crash.watched << " has ended the program by exit(" << code << ")"
+       << words_of_crash.cure;
   end_by_the_library(line);
 }
 
 void on_quick_exit_of_library() {
   if (page_of_crash == nullptr) return;
   Line line;
-  line << "the vendor's library has ended the program by quick_exit()" << kUnplug;
+  line << words_of_crash.watched << " has ended the program by quick_exit()" << words_of_crash.cure;
   end_by_the_library(line);
 }
 
@@ -107,9 +107,16 @@ void take_handlers(const sigset_t& ends) noexcept {
 
 }  // namespace
 
-Overseer::Overseer(const char* program, ArmPageAdapter& page, ArmExchange& exchange, Limits limits)
-    : program_(program), page_(page), exchange_(exchange), limits_(limits), ends_(ends_of_user()) {
+Overseer::Overseer(const char* program, ArmPageAdapter& page, ArmExchange& exchange, Limits limits,
+                   WatchWords words)
+    : program_(program),
+      words_(words),
+      page_(page),
+      exchange_(exchange),
+      limits_(limits),
+      ends_(ends_of_user()) {
   page_of_crash = &page;
+  words_of_crash = words;
   program_of_crash = program;
   give_crash_stack();
   take_handlers(ends_);
@@ -166,8 +173,7 @@ void Overseer::watch() {
       case Phase::opening:
         asked_ms = stop_requested() ? asked_ms + kLookMs : 0;
         if (ms > limits_.opening_ms || asked_ms > kMostClosingMs) {
-          end("the vendor's library does not return from opening the device; unplug it and plug it "
-              "in again");
+          end("opening");
         }
         break;
       case Phase::frames:
@@ -175,8 +181,7 @@ void Overseer::watch() {
         break;
       case Phase::closing:
         if (ms > kMostClosingMs) {
-          end("the vendor's library does not return from closing the device; unplug it and plug it "
-              "in again");
+          end("closing");
         }
         break;
       case Phase::over:
@@ -197,18 +202,23 @@ void Overseer::take_signals() noexcept {
 }
 
 void Overseer::look_at_frames() {
-  const std::uint64_t frames = exchange_.frames();
+  const std::uint64_t frames = exchange_.heartbeat();
   still_looks_ = frames == last_frames_ ? still_looks_ + 1 : 0;
   last_frames_ = frames;
   // The main thread watches the time to the first frame.
   if (frames == 0 || exchange_.finished() || still_looks_ * kLookMs < limits_.stall_ms) return;
   exchange_.fail(ArmExchange::kStalled);
-  page_.set_state(ArmState::failed, "the vendor's library has stopped its frames");
+  Line line;
+  line << words_.watched << " has stopped its frames";
+  page_.set_state(ArmState::failed, line.text());
 }
 
-void Overseer::end(const char* text) {
-  page_.set_state(ArmState::failed, text);
-  print(program_, phase_.load() == Phase::closing ? reason_.c_str() : "", text);
+void Overseer::end(const char* what) {
+  Line line;
+  line << words_.watched << " does not return from " << what << " the device"
+       << words_.opening_cure;
+  page_.set_state(ArmState::failed, line.text());
+  print(program_, phase_.load() == Phase::closing ? reason_.c_str() : "", line.text());
   end_is_told();
   _exit(2);
 }

@@ -7,12 +7,22 @@
 #include <string>
 #include <thread>
 
+#include "arm/arm_error.hpp"
 #include "arm/exchange.hpp"
 #include "shared/arm/arm_page.hpp"
 
 namespace kerf {
 
-/// Watches a vendor's library, which may hang or crash, from a separate thread.
+/// How the lines of an `Overseer` name what it watches, and end.
+struct WatchWords {
+  const char* watched = "the vendor's library";
+  const char* crashed = "the vendor's library, or kerf-arm in it,";
+  const char* opening_cure = "; unplug it and plug it in again";
+  const char* cure = kUnplug;
+};
+
+/// Watches a device's part of the program, which may hang or crash, from a separate thread: a
+/// vendor's library, or the turns with a service.
 ///
 /// Ends the program with one line on standard error, exit code 2 and the page's state `failed` if
 ///
@@ -29,6 +39,9 @@ namespace kerf {
 /// (`ends_of_user`). So they are blocked in the calling thread and in all that come later, and this
 /// thread takes them by sigwait: no handler, SIG_IGN or mask of the library matters then. For a
 /// thread that unblocks them the handlers are kerf's again in each period, those of a crash too.
+/// No end here stops the device: no call of a library that has crashed or exits is safe, and the
+/// last message to a service is said by the guard, when nothing of this process can follow it.
+///
 /// What no handler sees (_exit() in the library, a stack overflow in a thread without
 /// `give_crash_stack`, a crash within a period of a handler that was reset) is left to
 /// `run_guarded`.
@@ -43,9 +56,9 @@ class Overseer {
     int opening_ms = 10'000;
     int stall_ms = 100;
   };
-
   /// `program`: the first word of each line.
-  Overseer(const char* program, ArmPageAdapter& page, ArmExchange& exchange, Limits limits);
+  Overseer(const char* program, ArmPageAdapter& page, ArmExchange& exchange, Limits limits,
+           WatchWords words = {});
   ~Overseer();
   Overseer(const Overseer&) = delete;
   Overseer& operator=(const Overseer&) = delete;
@@ -68,9 +81,10 @@ class Overseer {
   void watch();
   void take_signals() noexcept;
   void look_at_frames();
-  [[noreturn]] void end(const char* text);
+  [[noreturn]] void end(const char* what);
 
   const char* program_;
+  WatchWords words_;
   ArmPageAdapter& page_;
   ArmExchange& exchange_;
   Limits limits_;

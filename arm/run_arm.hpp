@@ -21,7 +21,11 @@ struct ArmOptions {
   int index = -1;
   int rate_hz = 0;  ///< 0: touch: the library's own; omega: 4000
   bool auto_init = false;
-  std::optional<double> peak_n;  ///< omega: limit below the device's own
+  std::string service;               ///< [HOST:]PORT; empty: that of this machine
+  int events = -1;                   ///< port of its events; 0: none; -1: the usual one
+  std::string park, arm_id, handle;  ///< as in inverse3::Wanted
+  bool once = false;                 ///< end with the first controller
+  std::optional<double> peak_n;      ///< omega: limit below the device's own
   int priority = 81;
   int cpu = -1;
   int stall_ms = 100;
@@ -30,12 +34,13 @@ struct ArmOptions {
   std::string report;
 };
 
-/// `kerf-arm`: opens a device through its vendor's library and exchanges poses and forces with a
-/// controller through a shared page, until `stop`. While there is no controller, the force is zero
-/// and the device stays open.
+/// `kerf-arm`: opens a device through its vendor's library or service and exchanges poses and
+/// forces with a controller through a shared page, until `stop`. While there is no controller, the
+/// force is zero and the device stays open. In lock-step it serves one controller, as with
+/// `--once`.
 ///
 /// Returns the exit code: 0 after a requested end; 2, with one line on `err`, after bad input or a
-/// failure of the library or device.
+/// failure of the library, service or device.
 [[nodiscard]] int run_arm(int argc, const char* const* argv, const std::atomic<bool>& stop,
                           std::ostream& out, std::ostream& err);
 

@@ -8,11 +8,11 @@
 
 namespace kerf {
 
-/// A device that is reached through a vendor's library: HdArm, DhdArm.
+/// A device that is reached through a vendor's library (HdArm, DhdArm) or service (ServiceArm).
 ///
 /// Main thread, in this order: open, start, stop, close. From `start` to `stop` another thread runs
-/// frames, each of which calls `ArmExchange::turn` once; `stop` returns after the last frame. Any
-/// call may hang or crash in the library; `Overseer` watches for that.
+/// frames, each of which is one of `ArmExchange`; `stop` returns after the last frame. Any call may
+/// hang or crash in a library; `Overseer` watches for that.
 class VendorArm {
  public:
   virtual ~VendorArm() = default;

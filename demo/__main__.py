@@ -157,12 +157,11 @@ class Demo:
         self.ask, self.offer = ["--port", "socket:" + self.meet], ["--front", "socket", "--socket", self.meet]
         if options.port == "arm":  # the emulator stands behind the library that kerf-arm loads
             self.ask = ["--port", "arm:" + self.name]
-        elif options.port == "ws":  # the service of its vendor, emulated; both sides must know the port beforehand
-            with socket.socket() as free:
-                free.bind(("127.0.0.1", 0))
-                self.meet = free.getsockname()
-            place = f"{self.meet[0]}:{self.meet[1]}"
-            self.ask, self.offer = ["--port", "ws:" + place], ["--front", "websocket", "--ws", place]
+            if options.device not in demo_options.STAND_INS:  # or is the service; both sides must know its port beforehand
+                with socket.socket() as free:
+                    free.bind(("127.0.0.1", 0))
+                    self.meet = free.getsockname()
+                self.offer = ["--front", "websocket", "--ws", self.service()]
         elif options.port != "socket":
             bus = processes.path("bus")
             os.mkdir(bus)
@@ -259,13 +258,18 @@ class Demo:
                 *self.script_of("second_hand_script", told), "--unit-mm", told.get("second_hand_unit_mm", ""), *pace,
                 "--report", os.path.join(self.results, "emulator-2.json")], out="emulator-2.log", log="emulator-2.log")
 
+    def service(self):
+        return f"{self.meet[0]}:{self.meet[1]}"
+
     def start_arm(self):
-        """The adapter to the vendor's library. kerf's stand-in for that finds the emulator by KERF_STAND_IN."""
+        """The adapter to the vendor's service, or to its library. kerf's stand-in for that finds the emulator by KERF_STAND_IN."""
+        common = ["--device", self.options.device, "--name", self.name, "--report", os.path.join(self.results, "arm.json")]
+        if self.options.device not in demo_options.STAND_INS:
+            self.arm = self.processes.start("arm", [*common, "--service", self.service()], out="arm.log", log="arm.log")
+            return
         settings = f"socket:{self.meet},device={self.options.device},hand=pushed,priority=81"  # as the emulator
         os.environ["KERF_STAND_IN"] = settings
-        self.arm = self.processes.start("arm", [
-            "--device", self.options.device, "--name", self.name, "--library", os.path.abspath(self.options.library),
-            "--report", os.path.join(self.results, "arm.json")], out="arm.log", log="arm.log")
+        self.arm = self.processes.start("arm", [*common, "--library", os.path.abspath(self.options.library)], out="arm.log", log="arm.log")
 
     def is_met(self):
         if isinstance(self.meet, str):

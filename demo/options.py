@@ -10,7 +10,7 @@ import socket
 import tomllib
 
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0"),  # word of --port, its node
-         "inverse3": ("ws", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
+         "inverse3": ("arm", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
 STAND_INS = {"touch": "libHD.so", "omega": "libdrd.so.3"}  # kerf's own in place of the vendor's library
 PICTURE_SIZE, WINDOW_SIZE = "640x480", "1280x800"  # if none is given; a window's on a screen of 96 dots per inch
 FLAGS = ("--headless", "--full-screen", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--present", "--follow-view", "--virtual", "--two-machines")
@@ -194,13 +194,14 @@ def choose_devices(options, scene):
 def choose_port(options, stand_ins):
     """If none is given: a Cartesian device by its vendor's service or library, as a real one, unless in lock-step or between two
     machines; any other by a socket. `stand_ins`: the folder of kerf's libraries; empty if an installed kerf has none."""
-    if options.port == "arm":  # on the user's word alone: it may be a vendor's, and its device a real one
+    has_library = options.device in STAND_INS  # an inverse3 has a service, which the emulator is
+    if options.port == "arm" and has_library:  # on the user's word alone: it may be a vendor's, and its device a real one
         options.library = options.library or os.environ.get("KERF_ARM_LIBRARY", "")
     if not options.port:
         own = BUSES.get(options.device, ("socket", ""))[0]
-        fits = own == "ws" or (own == "arm" and stand_ins and not options.library)
+        fits = own == "arm" and (not has_library or (stand_ins and not options.library))
         options.port = own if fits and not options.virtual and not options.two_machines else "socket"
-    if options.port == "arm" and not options.library and stand_ins and options.device in STAND_INS:
+    if options.port == "arm" and not options.library and stand_ins and has_library:
         options.library, options.stand_in = os.path.join(stand_ins, STAND_INS[options.device]), True
 
 
@@ -238,10 +239,10 @@ def check(options):
     bus = BUSES[options.device][0]
     if options.port not in ("socket", bus):
         raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")
-    if options.port == "arm" and not options.stand_in and not os.path.isfile(options.library):
+    if options.port == "arm" and options.device in STAND_INS and not options.stand_in and not os.path.isfile(options.library):
         given = f"--library {options.library}: not a file" if options.library else "--port arm: no library"
         raise Refusal(f"{given}; name that of a stand-in for the vendor's: --library PATH")
-    if options.virtual and options.port not in ("socket", "fw", "ws"):
+    if options.virtual and options.port not in ("socket", "fw") and options.device != "inverse3":
         own = "a vendor's library" if options.port == "arm" else "a USB bus"
         raise Refusal(f"--virtual: {own} keeps its own time; take --port socket")
     options.headless = options.headless or not has_display()

@@ -14,14 +14,12 @@
 #include "controller/device/firewire/firewire_port.hpp"
 #include "controller/device/port/socket_port.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/text/text.hpp"
 #ifdef KERF_HAS_HID
 #include "controller/device/port/hid_port.hpp"
 #endif
 #ifdef KERF_HAS_USB
 #include "controller/device/port/usb_port.hpp"
-#endif
-#ifdef KERF_HAS_WS
-#include "controller/device/inverse3/service_port.hpp"
 #endif
 
 namespace kerf {
@@ -69,7 +67,7 @@ namespace {
 constexpr std::string_view kSocket = "socket:";
 constexpr std::string_view kUdp = "udp:";
 /// By Personality.
-constexpr std::array<std::string_view, 6> kBusOf{"fw", "usb", "hid", "ws", "arm", "arm"};
+constexpr std::array<std::string_view, 6> kBusOf{"fw", "usb", "hid", "arm", "arm", "arm"};
 static_assert(kBusOf.size() == kPersonalityWords.size());
 
 struct Request {
@@ -77,6 +75,7 @@ struct Request {
   int patience_ms = 0;
   const std::atomic<bool>& stop;
   IoThread io;
+  bool starts_arm = false;
 };
 
 /// The text after the name of a bus; empty for another port.
@@ -127,26 +126,13 @@ std::unique_ptr<PacketPort> arm(std::string_view rest, const Request* request) {
   if (!is_cartesian(request->ours.personality)) {
     throw std::runtime_error("--port arm: not for --device " +
                              std::string(word_of(request->ours.personality)) +
-                             "; take --device touch or omega");
+                             "; take --device inverse3, touch or omega");
   }
+  const bool starts = name.empty() && request->starts_arm;
   if (name.empty()) name = word_of(request->ours.personality);
-  return std::make_unique<ArmPort>(name, request->ours.personality, request->patience_ms,
-                                   request->stop);
+  return std::make_unique<ArmPort>(name, request->ours, request->patience_ms, request->stop,
+                                   starts);
 }
-
-#ifdef KERF_HAS_WS
-std::unique_ptr<PacketPort> ws(std::string_view rest, const Request* request) {
-  const inverse3::ServiceOptions options = inverse3::parse_service_port(rest);
-  if (!request) return nullptr;
-  return std::make_unique<inverse3::ServicePort>(options, request->ours, request->patience_ms,
-                                                 request->stop, request->io);
-}
-#else
-std::unique_ptr<PacketPort> ws(std::string_view, const Request*) {
-  throw std::runtime_error(
-      "--port ws: left out of this build; install libboost-dev, then ./kerf setup");
-}
-#endif
 
 std::unique_ptr<PacketPort> emulator(const std::string& text, const Request& request) {
   const bool is_udp = text.starts_with(kUdp);
@@ -167,10 +153,15 @@ std::unique_ptr<PacketPort> port(const std::string& text, const Request* request
   if (const auto rest = after("usb", text)) return usb(*rest, request);
   if (const auto rest = after("hid", text)) return hid(*rest, request);
   if (const auto rest = after("arm", text)) return arm(*rest, request);
-  if (const auto rest = after("ws", text)) return ws(*rest, request);
+  if (after("ws", text)) {
+    throw std::runtime_error(
+        "--port " + escaped(text) +
+        ": the Inverse3's service is kerf-arm's; take --port arm, which starts it, or for another "
+        "address, button or arm first ./kerf arm --device inverse3 --service [HOST:]PORT");
+  }
   if (!text.starts_with(kUdp) && !text.starts_with(kSocket)) {
     throw std::runtime_error("--port '" + text +
-                             "' is not known; use auto, fw, usb, hid, arm, ws, or socket:PATH or "
+                             "' is not known; use auto, fw, usb, hid, arm, or socket:PATH or "
                              "udp:[ADDRESS:]PORT, where kerf-emulator listens");
   }
   return request ? emulator(text, *request) : nullptr;
@@ -195,8 +186,9 @@ std::string resolve_port(const std::string& text, Personality personality) {
 }
 
 std::unique_ptr<PacketPort> open_port(const std::string& text, const LinkHello& ours,
-                                      int patience_ms, const std::atomic<bool>& stop, IoThread io) {
-  const Request request{ours, patience_ms, stop, io};
+                                      int patience_ms, const std::atomic<bool>& stop, IoThread io,
+                                      bool starts_arm) {
+  const Request request{ours, patience_ms, stop, io, starts_arm};
   return port(text, &request);
 }
 

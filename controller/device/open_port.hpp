@@ -30,8 +30,7 @@ void agree(PacketPort& port, const std::string& place, const LinkHello& ours, bo
 ///     fw[:WHERE][,OPTION...]         FireWire: FirewireOptions
 ///     usb[:WHERE][,firmware=FILE]    the Falcon: UsbOptions
 ///     hid[:WHERE]                    WoodenHaptics: parse_hid_port
-///     arm[:NAME]                     Touch, omega: kerf-arm of that name: parse_arm_port
-///     ws[:[HOST:]PORT][,OPTION...]   the Inverse3's service: ServiceOptions
+///     arm[:NAME]                     Inverse3, Touch, omega: kerf-arm of that name: parse_arm_port
 ///     auto                           the bus of the device, any connected one
 ///
 /// This throws std::runtime_error with one line for a text that names no port, or one that this
@@ -42,11 +41,12 @@ void check_port(const std::string& text);
 /// another device.
 [[nodiscard]] std::string resolve_port(const std::string& text, Personality personality);
 
-/// Opens a resolved port; `io` is for ports with threads of their own. Retries for `patience_ms`
+/// Opens a resolved port; `io` is for ports with threads of their own. `starts_arm`: for `arm`
+/// without a name starts kerf-arm if none runs. Retries for `patience_ms`
 /// while no device is connected, or until `stop`; the handshake with an emulator may take as long
 /// again.
 [[nodiscard]] std::unique_ptr<PacketPort> open_port(const std::string& text, const LinkHello& ours,
                                                     int patience_ms, const std::atomic<bool>& stop,
-                                                    IoThread io = {});
+                                                    IoThread io = {}, bool starts_arm = false);
 
 }  // namespace kerf

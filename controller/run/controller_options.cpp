@@ -88,8 +88,8 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
   app.option(
          "--port", options.ports,
          "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
-         "[,firmware=FILE]; ws[:[HOST:]PORT][,park=BUTTON][,device=ID][,handle=ID], the Inverse3's "
-         "service; arm[:NAME] of kerf-arm; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator; "
+         "[,firmware=FILE]; arm, which starts kerf-arm if none runs, or arm:NAME of one that does; "
+         "socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator; "
          "twice for a scene with two devices, in their order")
       .one_each()
       .shown_as("PORT");

@@ -195,7 +195,7 @@ std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Pe
   const std::string port = resolve_port(options.ports.front(), kind);
   try {
     const LateNote waits(text_before_device(port));
-    return open_port(port, {kind, false, rate_hz}, kPatienceMs, stop);
+    return open_port(port, {kind, false, rate_hz}, kPatienceMs, stop, {}, true);
   } catch (const std::runtime_error&) {
     const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
     if (!is_emulated && !stop) print(lacks_of_nodes(kind, list_device_nodes()));

@@ -123,12 +123,12 @@ std::vector<std::string> ports_of(const ControllerOptions& options, const Loaded
                                              "each, in their order"
                                            : ", and the scene has one [device]; give one"));
   }
-  std::vector<std::string> ports;
+  std::vector<std::string> ports, places;
   for (std::size_t arm = 0; arm < given.size(); ++arm) {
     const Personality personality = device_of(scene, arm).personality;
     ports.push_back(resolve_port(given[arm], personality));
-    if (ports[arm] == "arm") ports[arm] += ":" + std::string(word_of(personality));
-    if (arm == 0 || ports[arm] != ports[0]) continue;
+    places.push_back(ports[arm] == "arm" ? "arm:" + std::string(word_of(personality)) : ports[arm]);
+    if (arm == 0 || places[arm] != places[0]) continue;
     throw std::runtime_error("--port " + given[arm] +
                              ": is that of the first device too; name each one's own");
   }
@@ -211,8 +211,8 @@ RunStart::RunStart(const ControllerOptions& options, const std::atomic<bool>& st
       const LinkHello ours{device_of(scene, arm).personality, options.virtual_time,
                            scene.servo.rate_hz};
       const LateNote waits(report.waiting);
-      ports.push_back(
-          open_port(port_texts[arm], ours, kPortPatienceMs, stop, io_thread_of(options.real_time)));
+      ports.push_back(open_port(port_texts[arm], ours, kPortPatienceMs, stop,
+                                io_thread_of(options.real_time), true));
     }
   } catch (...) {
     if (stop) segment.set_lifecycle(Lifecycle::clean_end);

@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "controller/device/inverse3/service_port.hpp"
-
 namespace kerf::faults {
 namespace {
 
@@ -28,7 +26,6 @@ ServiceFault fault_of(const FaultyDevice::ServiceChange& change) {
 }  // namespace
 
 using inverse3::ForceKey;
-using inverse3::ServicePort;
 using inverse3::TurnGame;
 
 ServiceLink::ServiceLink(FaultyDevice& device, std::uint32_t seed)
@@ -60,7 +57,7 @@ void ServiceLink::connect() {
   } catch (const std::runtime_error&) {  // thrown if the device is not listed
   }
   retry_ns_ = now_ns() + backoff_ns_;
-  backoff_ns_ = std::min(2 * backoff_ns_, ServicePort::kLongestBackoffNs);
+  backoff_ns_ = std::min(2 * backoff_ns_, TurnGame::kLongestBackoffNs);
 }
 
 void ServiceLink::receive(std::span<const std::uint8_t> packet) noexcept {
@@ -141,14 +138,14 @@ void ServiceLink::pass_on(const CartesianReport& report) {
   reports_.push_back(encode(report));
 }
 
-/// As `ServicePort::drop`.
+/// As `ServiceArm::drop`.
 void ServiceLink::drop(bool carries_a_word) {
   pass_on(game_->session().farewell(number_ + 1));
   game_.reset();
   is_waiting_ = false;
   owes_word_ = carries_a_word;
-  const bool was_short = now_ns() - began_ns_ < ServicePort::kFirstBackoffNs;
-  backoff_ns_ = ServicePort::kFirstBackoffNs;
+  const bool was_short = now_ns() - began_ns_ < TurnGame::kFirstBackoffNs;
+  backoff_ns_ = TurnGame::kFirstBackoffNs;
   retry_ns_ = now_ns() + (was_short ? backoff_ns_ : 0);
   if (was_short) backoff_ns_ *= 2;
 }

@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "controller/device/inverse3/turn_game.hpp"
+#include "arm/inverse3/turn_game.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/front/inverse3/service_device.hpp"
 #include "hil/script/faulty_device.hpp"
@@ -14,10 +14,10 @@
 
 namespace kerf::faults {
 
-/// An Inverse3 behind the emulated service of its vendor, as the servo's driver sees it by `--port
-/// ws`: each command goes as JSON to the service, and each reply comes back through the driver's
-/// own parser, `Session` and `TurnGame`. Only the sockets and the thread of `ServicePort` are left
-/// out, so that the same arguments give the same bits.
+/// An Inverse3 behind the emulated service of its vendor, as the servo's driver sees it by
+/// kerf-arm: each command goes as JSON to the service, and each reply comes back through the
+/// driver's own parser, `Session` and `TurnGame`. Only the sockets and the thread of `ServiceArm`
+/// are left out, so that the same arguments give the same bits.
 ///
 /// A message is under way until its reply is there or 100 ms are over; then the connection is given
 /// up, with its last word if the link still carries one, and made anew at once, then after 0.5, 1,

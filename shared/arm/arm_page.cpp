@@ -8,11 +8,14 @@
 #include <system_error>
 
 #include <fcntl.h>
+#include <linux/futex.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "shared/posix/error_text.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/segment.hpp"
 #include "shared/segment/seqlock.hpp"
 
@@ -22,10 +25,10 @@ namespace {
 using namespace arm_page;
 
 constexpr std::uint64_t kMagic = 0x3167706d72616b;  // "karmpg1"
-constexpr std::uint32_t kLayout = 1;
+constexpr std::uint32_t kLayout = 2;
 
-constexpr std::size_t kAtMagic = 0, kAtLayout = 8, kAtDevice = 12, kAtRate = 16;
-constexpr std::size_t kAtSession = 64, kAtProcess = 72;
+constexpr std::size_t kAtMagic = 0, kAtLayout = 8, kAtDevice = 12, kAtRate = 16, kAtLockstep = 20;
+constexpr std::size_t kAtSession = 64, kAtProcess = 72, kAtBell = 96, kAtSleeps = 100;
 constexpr std::size_t kAtStatus = 128, kAtState = 136, kAtText = 144;
 constexpr std::size_t kAtHead = 256;
 constexpr std::size_t kAtCommands = 320, kPlaceBytes = 64;
@@ -74,6 +77,21 @@ ArmPageError failure(const std::string& path) {
   const int error = errno;
   return ArmPageError(path + ": " + system_message(error) + "; " +
                       remedy_for(error, "remove the file, or make the folder writable"));
+}
+
+// The bell, between processes. The order of all its words is that of one thread: either the
+// controller sees that the adapter sleeps, or the kernel that the bell has rung since.
+
+void sleep_at(std::byte* bell, std::uint32_t seen, std::int64_t until_ns) noexcept {
+  const timespec until{until_ns / kNsPerSecond, until_ns % kNsPerSecond};
+  syscall(SYS_futex, bell, FUTEX_WAIT_BITSET, seen, &until, nullptr, FUTEX_BITSET_MATCH_ANY);
+}
+void ring(std::byte* bell, std::byte* sleeps) noexcept {
+  shared_words::word<std::uint32_t>(bell).fetch_add(1);
+  if (shared_words::word<std::uint32_t>(sleeps).load() == 0) return;
+  const int error = errno;  // of the code that a signal handler has interrupted
+  syscall(SYS_futex, bell, FUTEX_WAKE, 1, nullptr, nullptr, 0);
+  errno = error;
 }
 
 /// The process of the adapter by the file, which may hold anything.
@@ -215,7 +233,33 @@ std::optional<TimedCommand> ArmPageAdapter::newest() const noexcept {
   if (newest.ticket == 0) return std::nullopt;
   const auto command = decode_cartesian_command(newest.packet);
   if (!command) return std::nullopt;
-  return TimedCommand{*command, newest.at_ns};
+  return TimedCommand{*command, newest.at_ns, newest.ticket};
+}
+
+bool ArmPageAdapter::await_command(std::uint64_t ticket, std::int64_t until_ns) const noexcept {
+  const auto has_come = [&] {
+    const auto command = newest();
+    return (command ? command->ticket : 0) != ticket;
+  };
+  using shared_words::word;
+  for (;;) {
+    const std::uint32_t seen = word<std::uint32_t>(at(kAtBell)).load();
+    if (has_come()) return true;
+    if (monotonic_ns() >= until_ns) return false;
+    word<std::uint32_t>(at(kAtSleeps)).store(1);
+    sleep_at(at(kAtBell), seen, until_ns);
+    word<std::uint32_t>(at(kAtSleeps)).store(0);
+  }
+}
+
+void ArmPageAdapter::set_lockstep(int rate_hz) noexcept {
+  using shared_words::word;
+  word<std::uint32_t>(at(kAtRate)).store(static_cast<std::uint32_t>(rate_hz));
+  word<std::uint32_t>(at(kAtLockstep)).store(1);
+}
+
+bool ArmPageAdapter::has_controller() const noexcept {
+  return is_locked_by_another(file_.get(), kControllerByte);
 }
 
 // The controller's side.
@@ -277,7 +321,11 @@ std::unique_ptr<ArmPageController> ArmPageController::open(const std::string& na
     shared_words::store(version + 8, &none, sizeof none);
     shared_words::close(version, odd + 1);
   }
+  page->hello_ = {device, word<std::uint32_t>(page->at(kAtLockstep)).load() != 0,
+                  static_cast<int>(word<std::uint32_t>(page->at(kAtRate)).load())};
   page->taken_ = word(page->at(kAtHead)).load(std::memory_order_acquire);
+  // In lock-step none comes before a command, and the first tick needs one.
+  if (page->hello_.lockstep && page->taken_ > 0) --page->taken_;
   return page;
 }
 
@@ -327,6 +375,7 @@ bool ArmPageController::send(const cartesian::CommandBytes& packet, std::int64_t
     const bool is_newest = shared_words::word(version + 8).load() < ticket;
     if (is_newest) shared_words::store(version + 8, &record, sizeof record);
     shared_words::close(version, seen + 2);
+    ring(at(kAtBell), at(kAtSleeps));
     return true;
   }
   return false;

@@ -15,6 +15,7 @@
 
 #include "shared/segment/connection.hpp"
 #include "shared/wire/cartesian.hpp"
+#include "shared/wire/emulator_link.hpp"
 #include "shared/wire/personality.hpp"
 
 /// The page that `kerf-arm` and a controller share: reports of a vendor's library in one direction,
@@ -23,16 +24,19 @@
 /// A small file in the runtime folder (`segment_folder()`), `arm-NAME.page`, rights 0600, mapped by
 /// both. Times are CLOCK_MONOTONIC, ns.
 ///
-///        0  u64 magic, u32 layout, u32 device, u32 rate in Hz
+///        0  u64 magic, u32 layout, u32 device, u32 rate in Hz, u32 lock-step
 ///       64  u64 session: of one adapter, 0 while it prepares the page
 ///       72  u64 process of the adapter
+///       96  u32 bell: commands so far, u32 whether the adapter sleeps at it
 ///      128  u64 version, u64 state, 112 bytes of text
 ///      256  u64 number of the newest report
 ///      320  4 commands of 64 bytes: u64 version, u64 ticket, i64 time, 16 bytes of the packet
 ///     4096  64 reports of 64 bytes: u64 version, i64 time, 40 bytes of the packet
 ///
-/// The adapter writes reports, the controller commands; nothing waits, and no access is a system
-/// call. Reports are a ring, so that a controller slower than the arm loses none of them. The
+/// The adapter writes reports, the controller commands; the controller waits for nothing, and no
+/// access is a system call, but one: a command wakes an adapter that sleeps until there is one, as
+/// that of a device which takes turns with its host (FUTEX_WAKE, which never blocks). Reports are a
+/// ring, so that a controller slower than the arm loses none of them. The
 /// commands have one place for each of the threads and signal handlers that may send at once: one
 /// that was interrupted in the middle of its place does not stop the others, and the highest ticket
 /// counts.
@@ -71,10 +75,11 @@ struct ArmStatus {
 /// Names of the adapters that run, for lists. Start-up only; a folder that cannot be read has none.
 [[nodiscard]] std::vector<std::string> running_arms();
 
-/// A command, and when it was written.
+/// A command, when it was written, and its number, from 1 on for each controller.
 struct TimedCommand {
   CartesianCommand command;
   std::int64_t at_ns = 0;
+  std::uint64_t ticket = 0;
 };
 
 /// The mapped file.
@@ -99,8 +104,8 @@ class ArmPage {
   std::byte* bytes_ = nullptr;
 };
 
-/// The adapter's side. `publish` and `newest` for one thread, `set_state` for any thread and any
-/// signal handler.
+/// The adapter's side. `publish`, `newest` and `await_command` for one thread, `set_state` for any
+/// thread and any signal handler.
 class ArmPageAdapter final : public ArmPage {
  public:
   /// Makes the page of `name`, or takes over that of a dead adapter. Throws ArmPageError with one
@@ -116,6 +121,14 @@ class ArmPageAdapter final : public ArmPage {
   void publish(CartesianReport report, std::int64_t now_ns) noexcept;
   /// The newest whole command on the page. Nothing if there is none, or none that is a packet.
   [[nodiscard]] std::optional<TimedCommand> newest() const noexcept;
+  /// Sleeps until the newest command is another one than that of `ticket` (0: none), at most until
+  /// `until_ns`. Whether it is.
+  bool await_command(std::uint64_t ticket, std::int64_t until_ns) const noexcept;
+  /// From now on the device runs in lock-step at this rate: each command is answered by one report,
+  /// and a controller begins with the newest report. Before the state `running`.
+  void set_lockstep(int rate_hz) noexcept;
+  /// Whether a controller has the page. A system call.
+  [[nodiscard]] bool has_controller() const noexcept;
   [[nodiscard]] std::uint64_t published() const noexcept { return published_; }
 
  private:
@@ -145,7 +158,11 @@ class ArmPageController final : public ArmPage {
   /// Reports that were overwritten before they were taken.
   [[nodiscard]] std::uint64_t overrun() const noexcept { return overrun_; }
 
-  /// False if all places are in use by other threads. Wait-free.
+  /// How the device runs, as it was when the page was opened.
+  [[nodiscard]] const LinkHello& hello() const noexcept { return hello_; }
+
+  /// False if all places are in use by other threads. Never blocks; a system call only to wake an
+  /// adapter that sleeps.
   bool send(const cartesian::CommandBytes& packet, std::int64_t now_ns) noexcept;
 
   /// Whether the session has ended, by its state or by another one in its place.
@@ -156,6 +173,7 @@ class ArmPageController final : public ArmPage {
   using ArmPage::ArmPage;
 
   std::uint64_t session_ = 0;
+  LinkHello hello_;
   std::uint64_t taken_ = 0;
   std::uint64_t overrun_ = 0;
   std::atomic<std::uint64_t> next_ticket_{1};

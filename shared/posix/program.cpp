@@ -66,6 +66,8 @@ int run_program(const char* program, const std::function<int()>& work) {
     if (why.empty()) return code;
     std::cerr << program << ": " << why << '\n';
     return code == 0 ? 2 : code;
+  } catch (const AlreadySaid&) {
+    return 2;
   } catch (...) {
     std::cerr << program << ": " << failure_text() << '\n';
     return 2;

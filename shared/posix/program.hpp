@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <functional>
+#include <stdexcept>
 #include <string>
 
 #include <unistd.h>
@@ -16,6 +17,12 @@ namespace kerf {
 /// sandbox), and each thread gets as much as the first one; a law of the user may need more.
 inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 
+/// A failure whose line a program has printed that was started for it. `what` is for reports.
+class AlreadySaid : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// The body of every `main` of kerf: runs `work` and returns its exit code. Around it:
 /// - no file or socket that it opens becomes standard input, output or error;
 /// - its files and folders get the rights that the umask leaves, and all of the user's own;
@@ -24,7 +31,8 @@ inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 /// - a file that may not grow any more (`ulimit -f`) is an error of the write, not a signal;
 /// - a stack of less than kLeastStackBytes is refused, because it would end in a crash;
 /// - a name in KERF_HIDE_SETS that no instruction set has is refused, as it would hide nothing;
-/// - an exception becomes one line on standard error, after `program`, and exit code 2;
+/// - an exception becomes one line on standard error, after `program`, and exit code 2; an
+///   AlreadySaid the exit code alone;
 /// - if standard output could not be written, a line on standard error, and 2 instead of 0.
 [[nodiscard]] int run_program(const char* program, const std::function<int()>& work);
 

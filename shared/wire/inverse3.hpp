@@ -11,7 +11,7 @@
 /// quaternions with named components.
 ///
 /// Frame of the service: X right, Y away from the user, Z up; origin on the device's mounting
-/// plate. Driver (controller/device/inverse3) and emulated service (hil/front/inverse3) convert it
+/// plate. Driver (arm/inverse3) and emulated service (hil/front/inverse3) convert it
 /// to kerf's frame with separate code, so that a wrong sign in one is not hidden by the same one in
 /// the other.
 namespace kerf::inverse3 {

@@ -23,6 +23,7 @@
 #include <unistd.h>
 
 #include "controller/device/arm/arm_port.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -409,7 +410,7 @@ TEST_CASE("page: random bytes under a live lock are one line, by what they hold,
   const int file = open(kerf::ArmPage::path_of("touch").c_str(), O_RDWR);
   const std::atomic<bool> stop{false};
   std::mt19937_64 random(7);
-  constexpr std::size_t kDevice = 12, kStatus = 128, kState = 136;
+  constexpr std::size_t kDevice = 12, kLockstep = 20, kStatus = 128, kState = 136;
   constexpr std::uint8_t kTouch = static_cast<std::uint8_t>(Personality::touch);
   int texts_with_breaks = 0;
   for (int round = 0; round < 600; ++round) {
@@ -419,10 +420,11 @@ TEST_CASE("page: random bytes under a live lock are one line, by what they hold,
     const char* says = ": of another version; start the kerf-arm of this one";
     if (round % 2 == 0) {  // a right magic and layout, and the rest random
       std::ranges::copy(
-          std::array<std::uint8_t, 12>{'k', 'a', 'r', 'm', 'p', 'g', '1', 0, 1, 0, 0, 0},
+          std::array<std::uint8_t, 12>{'k', 'a', 'r', 'm', 'p', 'g', '1', 0, 2, 0, 0, 0},
           head.begin());
       head[kDevice] = static_cast<std::uint8_t>(random() % 8);
       head[13] = head[14] = head[15] = 0;
+      std::fill_n(head.begin() + kLockstep, 4, std::uint8_t{0});
       head[kStatus] &= 0xfe;  // a text that nobody is writing
       says = head[kDevice] >= kerf::kPersonalityWords.size() ? says : " is of a ";
       if (round % 4 == 0) {  // and a state that may be one
@@ -441,8 +443,8 @@ TEST_CASE("page: random bytes under a live lock are one line, by what they hold,
       }
     }
     REQUIRE(pwrite(file, head.data(), head.size(), 0) == static_cast<ssize_t>(head.size()));
-    const std::string error =
-        error_of<std::runtime_error>([&] { kerf::ArmPort("touch", Personality::touch, 0, stop); });
+    const std::string error = error_of<std::runtime_error>(
+        [&] { kerf::ArmPort("touch", {Personality::touch}, 0, stop); });
     CAPTURE(error);
     CHECK(error.empty() == (*says == 0));
     CHECK(error.find(says) != std::string::npos);
@@ -450,4 +452,45 @@ TEST_CASE("page: random bytes under a live lock are one line, by what they hold,
   }
   CHECK(texts_with_breaks > 20);
   close(file);
+}
+
+TEST_CASE("page: an adapter that sleeps is woken by a command, and by nothing else") {
+  const RuntimeFolder folder;
+  ArmPageAdapter arm("inverse3", Personality::inverse3, 1000);
+  arm.set_state(ArmState::running, "");
+  kerf::ArmPageController::Absence absence{};
+  std::string text;
+  const auto end = kerf::ArmPageController::open("inverse3", Personality::inverse3, absence, text);
+  REQUIRE(end);
+  CHECK_FALSE(arm.await_command(0, kerf::monotonic_ns() + 1'000'000));
+  constexpr std::int64_t kLongNs = 60'000'000'000;
+  for (std::uint64_t ticket = 0; ticket < 1000; ++ticket) {
+    std::thread sender([&] { end->send(encode(kerf::CartesianCommand{}), 1); });
+    const bool is_woken = arm.await_command(ticket, kerf::monotonic_ns() + kLongNs);
+    sender.join();
+    REQUIRE(is_woken);
+    REQUIRE(arm.newest()->ticket == ticket + 1);
+  }
+  CHECK(arm.await_command(0, 0));  // there already
+  CHECK_FALSE(arm.await_command(1000, 0));
+}
+
+TEST_CASE("page: in lock-step a controller begins with the newest report, and its rate must fit") {
+  const RuntimeFolder folder;
+  ArmPageAdapter arm("inverse3", Personality::inverse3, 1000);
+  arm.set_lockstep(500);
+  for (int i = 1; i <= 3; ++i) arm.publish({}, i);
+  arm.set_state(ArmState::running, "");
+  const std::atomic<bool> stop{false};
+  const auto error = [&](const kerf::LinkHello& ours) {
+    return error_of<std::runtime_error>([&] { kerf::ArmPort("inverse3", ours, 0, stop); });
+  };
+  CHECK(error({Personality::inverse3, false, 500}).find("in lock-step") != std::string::npos);
+  CHECK(error({Personality::inverse3, true, 1000}).find("at 500 Hz") != std::string::npos);
+  kerf::ArmPort port("inverse3", {Personality::inverse3, true, 500}, 0, stop);
+  CHECK(arm.has_controller());
+  kerf::cartesian::ReportBytes packet;
+  REQUIRE(port.receive(packet) == packet.size());
+  CHECK(kerf::decode_cartesian_report(packet)->number == 3);
+  CHECK(port.receive(packet) == 0);
 }

@@ -130,7 +130,7 @@ class PushingChild {
     if (pid_ != 0) return;
     for (const int number : {SIGSEGV, SIGTERM}) std::signal(number, SIG_DFL);  // not doctest's
     const std::atomic<bool> stop{false};
-    ArmPort port(std::string(word_of(device)), device, 5000, stop);
+    ArmPort port(std::string(word_of(device)), {device}, 5000, stop);
     for (;;) {
       std::array<std::uint8_t, kerf::cartesian::kReportBytes> packet;
       while (port.receive(packet) > 0) {
@@ -368,7 +368,7 @@ TEST_CASE(
   Bench bench;
   const std::atomic<bool> stop{false};
   auto arm = bench.arm("touch", "");
-  auto port = std::make_unique<ArmPort>("touch", Personality::touch, 10'000, stop);
+  auto port = std::make_unique<ArmPort>("touch", kerf::LinkHello{Personality::touch}, 10'000, stop);
   CHECK(port->wait(1000));
   kill_library(*arm);
   CHECK(arm->wait() == 2);
@@ -385,7 +385,7 @@ TEST_CASE(
       10s));
   arm = bench.arm("touch", "");
   port.reset();  // its controller has ended by now
-  port = std::make_unique<ArmPort>("touch", Personality::touch, 10'000, stop);
+  port = std::make_unique<ArmPort>("touch", kerf::LinkHello{Personality::touch}, 10'000, stop);
   CHECK(port->wait(1000));
   CHECK_FALSE(port->closed());
   arm->signal(SIGTERM);
@@ -407,7 +407,7 @@ TEST_CASE("arm: killed at any moment, the next adapter is there at once") {
   }
   const auto arm = bench.arm("touch", "");
   const std::atomic<bool> stop{false};
-  ArmPort port("touch", Personality::touch, 10'000, stop);
+  ArmPort port("touch", {Personality::touch}, 10'000, stop);
   CHECK(port.wait(1000));
   arm->signal(SIGTERM);
   CHECK(arm->wait() == 0);
@@ -487,4 +487,28 @@ TEST_CASE("arm: the probe of a controller reads the arm's position and switches 
     arm->signal(SIGTERM);
     CHECK(arm->wait() == 0);
   }
+}
+
+TEST_CASE("arm: --port arm starts one if none runs; it ends with its controller, or says why not") {
+  const Bench bench;
+  setenv("KERF_MOCK", "", 1);
+  const auto probe = [&](const std::string& libraries) {
+    setenv("LD_LIBRARY_PATH", libraries.c_str(), 1);
+    auto controller = std::make_unique<Process>(
+        std::vector<std::string>{kBin + "/kerf-controller", "--probe", "--device", "touch",
+                                 "--port", "arm", "--seconds", "0.5"},
+        bench.folder / "log");
+    unsetenv("LD_LIBRARY_PATH");
+    return controller;
+  };
+  const auto none = probe(bench.folder.path().string());
+  CHECK(none->wait() == 2);
+  CHECK(none->output().find("kerf-arm: libHD.so: cannot open") != std::string::npos);
+  CHECK(none->output().find("kerf-controller: ") == std::string::npos);  // one line is enough
+  const auto served = probe(std::string(KERF_TEST_LIBRARIES) + "/mock_hd");
+  CAPTURE(served->output());
+  CHECK(served->wait() == 0);
+  CHECK(served->output().find(" at arm:touch") != std::string::npos);
+  CHECK(eventually([] { return kerf::running_arms().empty(); }, 20s));
+  CHECK(bench.last_call().find("hdDisableDevice") != std::string::npos);
 }

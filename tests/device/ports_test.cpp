@@ -57,8 +57,8 @@ TEST_CASE("a port that is none is refused with the ones that are") {
   }
   for (const char* text : {"", "usbx", "hid0", "fwd", "sock:/tmp/x", "automatic"}) {
     CAPTURE(text);
-    CHECK(has(error_of([&] { kerf::check_port(text); }),
-              "use auto, fw, usb, hid, arm, ws, or socket:"));
+    CHECK(
+        has(error_of([&] { kerf::check_port(text); }), "use auto, fw, usb, hid, arm, or socket:"));
   }
 }
 

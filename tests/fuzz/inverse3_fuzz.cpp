@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "controller/device/inverse3/session.hpp"
+#include "arm/inverse3/session.hpp"
 #include "shared/wire/cartesian.hpp"
 
 namespace {

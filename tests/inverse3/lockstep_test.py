@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kerf-controller over kerf-emulator's service, in lock-step: each run has the same bits, by each version of the service, and a
-handle's parking button arms it.
+"""kerf-controller and kerf-arm over kerf-emulator's service, in lock-step: each run has the same bits, by each version of the service,
+and a handle's parking button arms it; kerf-arm ends with its only controller.
 
     lockstep_test.py PROGRAMS ROOT"""
 import json
@@ -25,18 +25,24 @@ def run(folder, profile, *words):
     emulator = subprocess.Popen(
         [PROGRAMS / "kerf-emulator", "--personality", "inverse3", "--front", "websocket", "--ws", "0", "--profile", profile, "--lockstep",
          "--hand", ROOT / "scenes/hands/touch.toml", "--report", its, *words], stdout=subprocess.PIPE, text=True)
+    arm = None
     try:
         port = re.search(r"ws port (\d+)", emulator.stdout.readline())[1]
-        place = f"ws:{port}" + (",handle=40213" if profile == "3.5" else "")  # which has two
+        name = f"inverse3-{port}"
+        arm = subprocess.Popen([PROGRAMS / "kerf-arm", "--device", "inverse3", "--service", port, "--name", name,
+                                *(["--handle", "40213"] if profile == "3.5" else [])], stdout=subprocess.DEVNULL)  # which has two
         done = subprocess.run(
             [PROGRAMS / "kerf-controller", "--scene", ROOT / "scenes/touch.toml", "--device", "inverse3", "--torque-scale", "1,1,1",
-             "--port", place, "--virtual", "--seconds", "2", "--name", f"inverse3-{port}", "--report", mine],
+             "--port", f"arm:{name}", "--virtual", "--seconds", "2", "--name", name, "--report", mine],
             capture_output=True, text=True, timeout=300, check=False)
+        code = arm.wait(timeout=60)  # with its only controller
         emulator.wait(timeout=60)
     finally:
-        emulator.kill()
+        for program in filter(None, (arm, emulator)):
+            program.kill()
+            program.wait()
         emulator.stdout.close()
-        emulator.wait()
+    assert code == 0
     assert done.returncode == 0, done.stderr
     return json.loads(mine.read_text()), json.loads(its.read_text())
 

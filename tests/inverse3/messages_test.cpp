@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Messages of the Inverse Service, read and written.
-#include "controller/device/inverse3/messages.hpp"
+#include "arm/inverse3/messages.hpp"
 
 #include <array>
 #include <cmath>

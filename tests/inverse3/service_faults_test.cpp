@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The port while the emulated service, its link or its device goes wrong, and when it ends itself.
+// The arm while the emulated service, its link or its device goes wrong, and when it ends itself.
 // By the machine's clock: a label keeps them from busy machines.
 #include <array>
+#include <chrono>
+#include <csignal>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,6 +17,7 @@
 
 #include "hil/front/inverse3/service_device.hpp"
 #include "tests/inverse3/served.hpp"
+#include "tests/support/process.hpp"
 
 namespace {
 
@@ -392,7 +395,6 @@ TEST_CASE("a session whose frame another client turned is found within 2000 turn
     sleep_until_ns(monotonic_ns() + 1'000'000);
   }
   CHECK(port->closed());
-  CHECK_FALSE(port->send(encode(CartesianCommand{})));
   port.reset();
   CHECK(norm(service.end().motor_force_n()) == 0.0);
 }
@@ -426,6 +428,45 @@ TEST_CASE("a servo that stands still loses the force, though its port plays on")
   }
   REQUIRE(report);
   CHECK(report->force_mn[0] == 0);
+}
+
+TEST_CASE(
+    "zero force is the last message, whatever ends kerf-arm: a crash, kill -9, a signal, or no "
+    "controller") {
+  enum class End { crash, kill, kill_guard, ask, controller };
+  for (const End end : {End::crash, End::kill, End::kill_guard, End::ask, End::controller}) {
+    CAPTURE(static_cast<int>(end));
+    const RuntimeFolder folder;
+    ServedService service;
+    const auto options = service.options();
+    Process arm({std::string(KERF_TEST_BIN) + "/kerf-arm", "--device", "inverse3", "--service",
+                 std::to_string(options.service.port), "--events", "0", "--priority", "0"},
+                folder / "log");
+    std::optional<ArmPort> port(std::in_place, "inverse3", LinkHello{Personality::inverse3}, 20'000,
+                                kNoStop);
+    until_armed(*port);
+    until(*port, 2000, [](const CartesianReport& report) { return report.force_mn[0] > 1900; });
+    if (end == End::crash) kill(arm.child(), SIGSEGV);
+    if (end == End::kill) kill(arm.child(), SIGKILL);
+    if (end == End::kill_guard) kill(arm.pid(), SIGKILL);
+    if (end == End::ask) kill(arm.pid(), SIGTERM);
+    if (end == End::controller) {
+      port.reset();  // as one that was killed: no word of its own
+      sleep_until_ns(monotonic_ns() + 200'000'000);
+      kill(arm.pid(), SIGTERM);
+    }
+    const int code = arm.wait();
+    if (end == End::crash || end == End::kill) CHECK(code == 2);
+    if (end == End::ask || end == End::controller) CHECK(code == 0);
+    if (end == End::crash)
+      CHECK(text_of(folder / "log").find("kerf-arm has crashed (SIGSEGV)") != std::string::npos);
+    if (end == End::kill)
+      CHECK(text_of(folder / "log").find("killed; the device's service was given zero force") !=
+            std::string::npos);
+    const auto is_let_go = [&] { return !port || port->closed(); };
+    if (end == End::kill_guard) CHECK(eventually(is_let_go, std::chrono::seconds(10)));
+    CHECK_FALSE(service.records().front().pushes_at_end);
+  }
 }
 
 TEST_SUITE_END();

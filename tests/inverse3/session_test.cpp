@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One connection without its socket: proof, echo, bars, buttons and frame.
-#include "controller/device/inverse3/session.hpp"
+#include "arm/inverse3/session.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The game of turns on one connection, in the time of the test.
-#include "controller/device/inverse3/turn_game.hpp"
+#include "arm/inverse3/turn_game.hpp"
 
 #include <cstdint>
 #include <optional>

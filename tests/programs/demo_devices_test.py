@@ -66,7 +66,7 @@ class TestLockStep(unittest.TestCase):
         if not lack.has_network():
             print("skipped: " + lack.NETWORK)
             return
-        self.mills("--device", "inverse3", "--port", "ws")
+        self.mills("--device", "inverse3", "--port", "arm")
 
 
 @unittest.skipUnless(MODE == "realtime", "in lock-step")

@@ -60,7 +60,7 @@ class TestOptions(unittest.TestCase):
     def test_defaults(self):
         self.assertEqual((checked().seconds, checked().out, checked().headless), ("10", "kerf-demo", True))
         self.assertEqual(checked("--serve").seconds, "60")
-        self.assertTrue(checked("--device", "inverse3", "--port", "ws", "--virtual").virtual)
+        self.assertTrue(checked("--device", "inverse3", "--port", "arm", "--virtual").virtual)
         mouse = checked("--hand", "mouse", display=":0")
         self.assertEqual((mouse.seconds, mouse.bound_is_told), ("600", True))
         self.assertFalse(checked("--seconds", "3").bound_is_told)

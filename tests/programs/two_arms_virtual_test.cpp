@@ -106,8 +106,12 @@ TEST_CASE("virtual time: an arm's link and port are its own, and a fault is expl
   REQUIRE(kerf::test::eventually(served, 20s));
   const std::string said = run.emulators[0]->output();
   const int port = std::stoi(said.substr(said.find(before) + before.size()));
+  const std::string name = "two-arms-" + std::to_string(port);
+  kerf::test::Process arm({std::string(KERF_TEST_BIN) + "/kerf-arm", "--device", "inverse3",
+                           "--service", std::to_string(port), "--name", name},
+                          run.folder / "arm.log");
   run.control({"--virtual", "--seconds", "2", "--torque-scale", "1,1,1,0.342,0.342,0.342"},
-              {"ws:" + std::to_string(port), "socket:" + run.socket(1)});
+              {"arm:" + name, "socket:" + run.socket(1)});
   CHECK(run.controller->wait() == 1);
   CAPTURE(run.controller->output());
   const ReadJson report = run.report();

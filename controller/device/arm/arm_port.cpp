@@ -3,8 +3,14 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <vector>
+
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
@@ -32,22 +38,63 @@ std::string absent_text(const std::string& name, Personality device,
   return "the " + arm + " has ended" + reason + "; " + start;
 }
 
+/// The kerf-arm beside this program, in a process group of its own: a terminal's signals reach the
+/// controller alone, with which it ends. What it prints goes to the error stream. Returns its
+/// process; 0 if there is no such program.
+pid_t start_arm(Personality device) {
+  const std::string program = find_beside_program("kerf-arm");
+  if (program.empty()) return 0;
+  std::string word(word_of(device));
+  std::vector<std::string> words{program, "--device", word, "--once"};
+  std::vector<char*> arguments;
+  for (std::string& one : words) arguments.push_back(one.data());
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawnattr_init(&attributes);
+  posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  pid_t child = 0;
+  const int error =
+      posix_spawn(&child, program.c_str(), &actions, &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  return error == 0 ? child : 0;
+}
+
 }  // namespace
 
-ArmPort::ArmPort(const std::string& name, Personality device, int patience_ms,
-                 const std::atomic<bool>& stop) {
+ArmPort::ArmPort(const std::string& name, const LinkHello& ours, int patience_ms,
+                 const std::atomic<bool>& stop, bool starts)
+    : in_lockstep_(ours.lockstep) {
+  const Personality device = ours.personality;
   const std::int64_t give_up_ns = monotonic_ns() + patience_ms * kMillisecondNs;
+  pid_t child = 0;
   for (;;) {
     ArmPageController::Absence absence{};
     std::string said;
     page_ = ArmPageController::open(name, device, absence, said);
     if (page_) break;
+    if (starts && absence == ArmPageController::Absence::no_adapter) {
+      child = start_arm(device);
+      starts = false;
+    }
+    if (child > 0 && waitpid(child, nullptr, WNOHANG) == child) {
+      throw AlreadySaid("--port arm:" + name + ": kerf-arm has ended");
+    }
+    if (child > 0 && !stop) {
+      sleep_until_ns(monotonic_ns() + kRetryNs);
+      continue;
+    }
     if (stop || monotonic_ns() >= give_up_ns) {
       throw std::runtime_error("--port arm:" + name + ": " +
                                absent_text(name, device, absence, said));
     }
     sleep_until_ns(monotonic_ns() + kRetryNs);
   }
+  const std::string reason = discord(ours, page_->hello());
+  if (!reason.empty()) throw std::runtime_error("--port arm:" + name + ": " + reason);
   heard_ns_ = monotonic_ns();
 }
 
@@ -59,7 +106,8 @@ std::size_t ArmPort::receive(std::span<std::uint8_t> out) noexcept {
     std::copy_n(packet.begin(), std::min(packet.size(), out.size()), out.begin());
     return packet.size();
   }
-  if (monotonic_ns() - heard_ns_ > kSilenceNs) silent_.store(true, std::memory_order_relaxed);
+  if (!in_lockstep_ && monotonic_ns() - heard_ns_ > kSilenceNs)
+    silent_.store(true, std::memory_order_relaxed);
   return 0;
 }
 

@@ -12,24 +12,27 @@
 
 #include "controller/device/port/packet_port.hpp"
 #include "shared/arm/arm_page.hpp"
-#include "shared/wire/personality.hpp"
+#include "shared/wire/emulator_link.hpp"
 
 namespace kerf {
 
-/// The port to `kerf-arm`, which stands between a vendor's library and the page that both map
-/// (shared/arm/arm_page.hpp). No method makes a system call, except `wait`.
+/// The port to `kerf-arm`, which stands between a vendor's library or service and the page that
+/// both map (shared/arm/arm_page.hpp). No method makes a system call, except `wait`, and `send` if
+/// it has to wake the adapter.
 ///
-/// The port closes if the adapter ends or fails, if another adapter takes its page, or if no report
-/// has come for kSilenceNs: so a killed adapter needs no lock to be read in the loop. The servo has
-/// latched `stale_input` long before.
+/// The port closes if the adapter ends or fails, if another adapter takes its page, or, but in
+/// lock-step, if no report has come for kSilenceNs: so a killed adapter needs no lock to be read in
+/// the loop. The servo has latched `stale_input` long before.
 class ArmPort final : public PacketPort {
  public:
   static constexpr std::int64_t kSilenceNs = 1'000'000'000;
 
-  /// `name`: of the adapter. Tries for `patience_ms` while none runs, or until `stop`. Throws
-  /// std::runtime_error with one line.
-  ArmPort(const std::string& name, Personality device, int patience_ms,
-          const std::atomic<bool>& stop);
+  /// `name`: of the adapter. Tries for `patience_ms` while none runs, or until `stop`. `starts`: if
+  /// none runs, starts one for the device, which ends with this controller, and waits until that is
+  /// ready, or has ended with a line of its own (AlreadySaid). Throws std::runtime_error with one
+  /// line, if its device does not fit `ours` too.
+  ArmPort(const std::string& name, const LinkHello& ours, int patience_ms,
+          const std::atomic<bool>& stop, bool starts = false);
 
   [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override;
   bool send(std::span<const std::uint8_t> packet) noexcept override;
@@ -41,6 +44,7 @@ class ArmPort final : public PacketPort {
 
  private:
   std::unique_ptr<ArmPageController> page_;
+  bool in_lockstep_ = false;
   std::int64_t heard_ns_ = 0;  ///< when the last report was taken
   std::atomic<bool> silent_{false};
   std::uint64_t packets_ = 0;

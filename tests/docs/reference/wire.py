@@ -184,7 +184,7 @@ def inverse3(root):
     faults = re.findall(r'"([^"]+)"', re.search(r"kServiceFaultWords\{([^}]*)\}", device.text)[1])
     return f"""## The Inverse3's service
 
-`--port ws` and `--front websocket`: JSON as text over a WebSocket at port {file.number('kServicePort')}, and events at {file.number('kEventPort')}. The words are those of
+`kerf-arm --device inverse3` and `--front websocket`: JSON as text over a WebSocket at port {file.number('kServicePort')}, and events at {file.number('kEventPort')}. The words are those of
 the vendor's public pages; the emulated service has the members that kerf reads, and some more.
 
 * **Speaks first**: the service, with the list of its devices and their configuration. Then each message of the client has one
@@ -193,7 +193,7 @@ the vendor's public pages; the emulated service has the members that kerf reads,
   `values` in place of `vector` before 3.5. It lasts one message.
 * **Frame**: X right, Y away from the user, Z up, m. kerf has x = X, y = Z, z = -Y, about ({origin}) m of the service, a choice of ours.
 * **Emulated**: versions {", ".join(f"`{word}`" for word in profiles)} (`--profile`); `GET /version`, `/devices`, `/settings/devices/force_scale`. The answer
-  to `/version` has a member `kerf_emulator`, by which kerf's driver sees whether both run in lock-step. Faults (`--bus-fault`):
+  to `/version` has a member `kerf_emulator`, by which `kerf-arm` sees whether it runs in lock-step. Faults (`--bus-fault`):
   {", ".join(f"`{word}`" for word in faults)}.
 """
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/inverse3/turn_game.hpp"
+#include "arm/inverse3/turn_game.hpp"
 
 #include <algorithm>
 #include <array>

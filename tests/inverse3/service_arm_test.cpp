@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The port against the emulated service: names, versions, forces and the end.
+// The arm against the emulated service, with the controller's port behind it: names, versions,
+// forces and the end.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -25,46 +26,35 @@ namespace {
 
 using namespace kerf;
 using namespace kerf::test;
-using inverse3::parse_service_port;
-using inverse3::ServiceOptions;
 
 }  // namespace
 
 // ---- its name ----
 
-TEST_CASE("--port ws: this machine's service by itself, or another place, button and device") {
-  const ServiceOptions plain = parse_service_port("");
-  CHECK(plain.service.host == "127.0.0.1");
-  CHECK(plain.service.port == 10001);
-  CHECK(plain.event_port == 10020);
-  CHECK(plain.wanted.park.view().empty());
-  const ServiceOptions all =
-      parse_service_port(":10.0.0.2:12,park=home,device=0A1C,handle=51877,events=13");
-  CHECK(all.service.host == "10.0.0.2");
-  CHECK(all.service.port == 12);
-  CHECK(all.event_port == 13);
-  CHECK(all.wanted.park == "home");
-  CHECK(all.wanted.device_id == "0A1C");
-  CHECK(all.wanted.handle_id == "51877");
-  CHECK(plain.wanted.handle_id.view().empty());
-  CHECK(parse_service_port(":65535").service.port == 65535);
-  CHECK(parse_service_port(":5000").event_port == 0);
-  CHECK(parse_service_port(":[::1]:5000").service.host == "::1");
-  CHECK(parse_service_port(",events=0").event_port == 0);
-  for (const char* wrong :
-       {":", ":0", ":65536", ":x", "::5", ":host:", ",", ",park", ",park=", ",park=a b",
-        ",colour=red", ",events=65536", ",events=x", ",device=\"", ",handle=", ":1,,"}) {
+TEST_CASE("--service: that of this machine by itself, or another place") {
+  CHECK(parse_service("").host == "127.0.0.1");
+  CHECK(parse_service("").port == 10001);
+  CHECK(parse_service("10.0.0.2:12").host == "10.0.0.2");
+  CHECK(parse_service("10.0.0.2:12").port == 12);
+  CHECK(parse_service("65535").port == 65535);
+  CHECK(parse_service("5000").host == "127.0.0.1");
+  CHECK(parse_service("[::1]:5000").host == "::1");
+  for (const char* wrong : {":", "0", "65536", "x", ":5000", "host:", "1,", "1 ", "-1"}) {
     CAPTURE(wrong);
-    CHECK(has(error_of([&] { static_cast<void>(parse_service_port(wrong)); }), "give ws alone"));
+    CHECK(has(error_of([&] { static_cast<void>(parse_service(wrong)); }),
+              "--service " + std::string(wrong) + ": not [HOST:]PORT"));
   }
 }
 
-TEST_CASE("auto is the service for an Inverse3, and a port of the service is for it alone") {
-  CHECK(resolve_port("auto", Personality::inverse3) == "ws");
-  CHECK_NOTHROW(check_port("ws"));
-  CHECK_NOTHROW(check_port("ws:5000,park=a"));
-  CHECK(has(error_of([] { static_cast<void>(resolve_port("ws:5000", Personality::omni)); }),
-            "not for --device omni"));
+TEST_CASE("the port of a service is kerf-arm's: --port arm, and what ws was is refused in a line") {
+  CHECK(resolve_port("auto", Personality::inverse3) == "arm");
+  for (const char* former : {"ws", "ws:5000,park=a"}) {
+    CHECK(error_of([&] { check_port(former); }) ==
+          "--port " + std::string(former) +
+              ": the Inverse3's service is kerf-arm's; take --port arm, which starts it, or for "
+              "another address, button or arm first ./kerf arm --device inverse3 --service "
+              "[HOST:]PORT");
+  }
 }
 
 // ---- versions ----
@@ -214,7 +204,10 @@ class Stranger {
 };
 
 std::string refusal_of(std::uint16_t port) {
-  return error_of([&] { open(parse_service_port(":" + std::to_string(port))); });
+  ServiceArm::Options options;
+  options.service.port = port;
+  options.patience_ms = 0;
+  return error_of([&] { open(options); });
 }
 
 }  // namespace
@@ -233,7 +226,7 @@ TEST_CASE("nobody, a silent program and one that speaks otherwise: one line, and
        {free_port, silent.port(), banner.port(), page.port(), other.port(), huge.port()}) {
     CAPTURE(port);
     const std::string line = refusal_of(port);
-    CHECK(line.starts_with("--port ws:127.0.0.1:" + std::to_string(port) + ": "));
+    CHECK(line.starts_with("--service 127.0.0.1:" + std::to_string(port) + ": "));
     CHECK(has(line, "needs the vendor's Inverse Service 3.1 or newer"));
     CHECK_FALSE(has(line, "\n"));
   }

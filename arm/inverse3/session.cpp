@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/inverse3/session.hpp"
+#include "arm/inverse3/session.hpp"
 
 #include <algorithm>
 #include <cmath>

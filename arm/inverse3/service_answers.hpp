@@ -5,9 +5,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "controller/device/inverse3/messages.hpp"
-#include "controller/device/inverse3/web_socket.hpp"
-#include "shared/wire/emulator_link.hpp"
+#include "arm/inverse3/messages.hpp"
+#include "arm/inverse3/web_socket.hpp"
 
 // What the HTTP answers of a service mean, with the way out.
 
@@ -25,9 +24,15 @@ struct Refusal : std::runtime_error {
 /// std::runtime_error if a later try may meet another answer (503, in use). `who` begins the text.
 [[noreturn]] void throw_status(const std::string& who, const HttpAnswer& answer);
 
-/// The answer to /version. Throws as `throw_status`; a Refusal if it has no version, one before
-/// 3.1, or is kerf's emulated service that does not fit `ours`.
-[[nodiscard]] ForceKey force_key_of(const HttpAnswer& answer, const LinkHello& ours);
+/// The answer to /version.
+struct ServiceVersion {
+  std::string text;  ///< "3.5.0.0"
+  ForceKey key{};
+  /// Turns a second of kerf's emulated service in lock-step; 0: by the clock, as every real one.
+  int lockstep_hz = 0;
+};
+/// Throws as `throw_status`; a Refusal if the answer has no version, or one before 3.1.
+[[nodiscard]] ServiceVersion version_in(const HttpAnswer& answer);
 
 /// The answer to /settings/devices/force_scale; empty if it has none.
 [[nodiscard]] std::optional<double> force_scale_of(const HttpAnswer& answer);

@@ -64,6 +64,11 @@ class WebSocket {
   /// Says it now: nothing else leaves after it but the closing frame.
   void say_last_word() noexcept;
 
+  /// The socket, and the last word as the bytes that leave through it: for another process, which
+  /// says it when this one cannot any more.
+  [[nodiscard]] int handle() const noexcept;
+  [[nodiscard]] std::string_view last_word_bytes() const noexcept;
+
   /// False if the message has not left within the time, or the last word has; the connection is
   /// useless then.
   [[nodiscard]] bool send(std::string_view text, int timeout_ms) noexcept;

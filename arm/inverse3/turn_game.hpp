@@ -6,12 +6,12 @@
 #include <string>
 #include <string_view>
 
-#include "controller/device/inverse3/session.hpp"
+#include "arm/inverse3/session.hpp"
 
 namespace kerf::inverse3 {
 
 /// The game of turns on one connection, without its socket: which message goes out, what a reply or
-/// its absence means, and when the connection is over. `ServicePort` plays it over a WebSocket,
+/// its absence means, and when the connection is over. `ServiceArm` plays it over a WebSocket,
 /// kerf-lab in virtual time.
 ///
 /// Whatever ends a connection, `last_word` is the last message on it: what a service does with the
@@ -32,6 +32,10 @@ class TurnGame {
   /// 20 ms less the 5 ms by which a wake-up may be late before it counts.
   static constexpr std::int64_t kUnreadNs = kTakeBackNs - kLateNs;
   static constexpr std::uint64_t kFullStateTurns = 2000;  ///< between two requests for all state
+  /// After a lost connection the next one is tried at once, unless the lost one was shorter than
+  /// the first of these pauses; each is twice as long as the one before.
+  static constexpr std::int64_t kFirstBackoffNs = 500'000'000;
+  static constexpr std::int64_t kLongestBackoffNs = 10'000'000'000;
 
   /// Throws as `Session`.
   TurnGame(const Wanted& wanted, ForceKey key, const ServiceState& first, std::int64_t now_ns)

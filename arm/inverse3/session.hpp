@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "controller/device/inverse3/messages.hpp"
+#include "arm/inverse3/messages.hpp"
 #include "shared/wire/cartesian.hpp"
 
 // One connection to the Inverse Service, without its socket: which device, whether its force

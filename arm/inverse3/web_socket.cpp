@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/inverse3/web_socket.hpp"
+#include "arm/inverse3/web_socket.hpp"
 
 #include <algorithm>
 #include <array>
@@ -182,6 +182,7 @@ class Line {
   void set_last_word(std::string_view text) {
     last_word_ = text.empty() ? std::string() : frame_of(text, static_cast<std::uint32_t>(mask_()));
   }
+  [[nodiscard]] std::string_view last_word() const noexcept { return last_word_; }
   [[nodiscard]] bool has_ended() const noexcept { return has_ended_; }
   void say_last_word() noexcept {
     if (std::exchange(has_ended_, true) || last_word_.empty()) return;
@@ -272,6 +273,14 @@ WebSocket::~WebSocket() {
 
 void WebSocket::set_last_word(std::string_view text) {
   connection_->line().set_last_word(text);
+}
+
+int WebSocket::handle() const noexcept {
+  return connection_->line().next_layer().native_handle();
+}
+
+std::string_view WebSocket::last_word_bytes() const noexcept {
+  return connection_->line().last_word();
 }
 
 void WebSocket::say_last_word() noexcept {

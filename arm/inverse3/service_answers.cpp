@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/inverse3/service_answers.hpp"
+#include "arm/inverse3/service_answers.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <string_view>
@@ -13,9 +14,10 @@ namespace kerf::inverse3 {
 namespace {
 
 constexpr unsigned kOk = 200;
+constexpr int kFastestHz = 8000;
 
 /// "3.5.0.0" as 305; nothing for another text.
-std::optional<int> version_of(std::string_view text) {
+std::optional<int> number_of(std::string_view text) {
   int parts[2]{};
   for (int& part : parts) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), part);
@@ -68,7 +70,7 @@ std::string text_of_status(unsigned status, const std::string& answer) {
     case 407:
       return "asks for a login (" + answer +
              "), as no Inverse Service does; a proxy or another program answers there: name the "
-             "service's own address and port, --port ws:HOST:PORT";
+             "service's own address and port, --service HOST:PORT";
     case 404:
       return "has no such address (" + answer + "); " + kNeeds;
     default:
@@ -76,8 +78,9 @@ std::string text_of_status(unsigned status, const std::string& answer) {
   }
   if (status >= 300 && status < 400) {
     return "sends elsewhere (" + answer +
-           "), so another program answers there: name the service's own address and port, --port "
-           "ws:HOST:PORT";
+           "), so another program answers there: name the service's own address and port, "
+           "--service "
+           "HOST:PORT";
   }
   if (status >= 500) {
     return "has an error of its own (" + answer +
@@ -96,26 +99,26 @@ void throw_status(const std::string& who, const HttpAnswer& answer) {
   throw Refusal(text);
 }
 
-ForceKey force_key_of(const HttpAnswer& answer, const LinkHello& ours) {
+ServiceVersion version_in(const HttpAnswer& answer) {
   if (answer.status != kOk) throw_status("the service", answer);
-  std::string version;
-  LinkHello theirs{Personality::inverse3, false, ours.rate_hz};
+  ServiceVersion version;
   try {
     const Json json = Json::parse(answer.body);
-    version = json.at("project_version").get<std::string>();
-    if (json.contains("kerf_emulator")) {  // the emulated service says how it runs
-      theirs.lockstep = json.at("kerf_emulator").at("lockstep").get<bool>();
-      theirs.rate_hz = json.at("kerf_emulator").at("rate_hz").get<int>();
+    version.text = one_line(json.at("project_version").get<std::string>());
+    if (json.contains("kerf_emulator")) {
+      const Json& emulator = json.at("kerf_emulator");
+      if (emulator.at("lockstep").get<bool>()) {
+        version.lockstep_hz = std::clamp(emulator.at("rate_hz").get<int>(), 1, kFastestHz);
+      }
     }
   } catch (const JsonError&) {
     throw Refusal("what answers there gives no version of an Inverse Service (HTTP " +
                   std::to_string(answer.status) + "); " + kNeeds);
   }
-  const std::string reason = discord(ours, theirs);
-  if (!reason.empty()) throw Refusal(reason);
-  const auto number = version_of(version);
-  if (!number || *number < 301) throw Refusal("version " + one_line(version) + "; " + kNeeds);
-  return *number >= 305 ? ForceKey::vector : ForceKey::values;
+  const auto number = number_of(version.text);
+  if (!number || *number < 301) throw Refusal("version " + version.text + "; " + kNeeds);
+  version.key = *number >= 305 ? ForceKey::vector : ForceKey::values;
+  return version;
 }
 
 std::optional<double> force_scale_of(const HttpAnswer& answer) {
