@@ -13,7 +13,7 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 rooms='
 include/kerf
 
-shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment shared/arm
+shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment shared/external shared/arm
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/law controller/servo controller/tick controller/law/registry
@@ -62,7 +62,7 @@ rooms_and_folders() {
   comm -13 <(echo "$known") <(echo "$folders") | sed 's|$|/   <- no room of that name|'
   comm -23 <(echo "$known") <(echo "$folders") | sed 's|$|/   <- a room without C++|'
   # Headers for other people's programs have the names that those programs include.
-  find "${programs[@]}" tests -path standin/include -prune -o -regextype egrep -regex '.*\.(c|h|cc|hh|cxx|hxx|c\+\+|h\+\+|inl|ipp|tpp)' \
+  find "${programs[@]}" tests \( -path standin/include -o -path include/kerf/external.h \) -prune -o -regextype egrep -regex '.*\.(c|h|cc|hh|cxx|hxx|c\+\+|h\+\+|inl|ipp|tpp)' \
     -printf '%p   <- C++ ends in .cpp or .hpp\n'
 }
 
@@ -137,7 +137,7 @@ broken() {
   local posix='(fcntl|netdb|poll|pthread|sched|unistd|sys/(eventfd|file|mman|random|resource|socket|stat|time|un))\.h'
   includes '<' shared controller/kernel controller/law controller/servo |
     grep -vE "include[[:space:]]*<[a-z_]+>|$large" |
-    grep -vE "^shared/(posix|segment|arm)/.*<$posix>" |
+    grep -vE "^shared/(posix|segment|external|arm)/.*<$posix>" |
     grep -vE '^shared/arm/arm_page.cpp:.*<(linux/futex|sys/syscall)\.h>' |
     grep -vE '^shared/posix/report_tool.cpp:.*<(spawn|sys/wait)\.h>' |
     grep -vE '^shared/posix/gzip_writer.cpp:.*<zlib\.h>' |

@@ -104,6 +104,10 @@ bool Servo::apply(const ServoCommand& command) noexcept {
   return parts_->apply(command);
 }
 
+bool Servo::give_force(const ProgramForce& force, std::size_t arm) noexcept {
+  return arm < arms() && parts_->servo->give_force(arm, force);
+}
+
 VoxelView Servo::voxels(std::size_t volume) const noexcept {
   const auto& volumes = parts_->loaded.volumes;
   if (volume >= volumes.size()) return {};

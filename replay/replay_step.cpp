@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "replay/replay_step.hpp"
 
+#include <array>
 #include <cstddef>
 #include <span>
 
@@ -29,6 +30,9 @@ std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded) noexce
 
 std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& recorded) noexcept {
   static_cast<void>(apply_commands(commands_of(of_arms(recorded, servo)), servo));
+  for (std::size_t arm = 0; arm < servo.arms(); ++arm) {
+    servo.repeat_force(arm, std::to_array(recorded[arm].contact_force_n));
+  }
   const auto reports = reports_of(recorded);
   std::array<ServoOutput, kMaxArms> outputs;
   servo.step(of_arms(reports, servo), of_arms(outputs, servo));

@@ -493,7 +493,7 @@ LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
 }
 
 double device_stiffness_n_per_mm(const LoadedScene& scene) {
-  if (scene.force.model == ForceModel::proxy) return scene.force.stiffness_n_per_mm;
+  if (scene.force.model != ForceModel::paper) return scene.force.stiffness_n_per_mm;
   const double scale = scene.device.workspace_scale;
   return scale * scale * 2 * std::numbers::pi * scene.tools[scene.active_tool].radius_mm *
          scene.force.p0_n_per_mm2;

@@ -68,6 +68,8 @@ void Publisher::publish(Tick tick, std::span<const DeviceReport> reports,
   // The first arm last: a reader that sees its record finds those of the others.
   for (std::size_t a = outputs.size(); a-- > 0;) segment_.publish_state(records[a], a);
   segment_.end_tick(static_cast<std::uint64_t>(timing.heartbeat_ns));
+  if (external_ == nullptr) return;
+  for (std::size_t a = outputs.size(); a-- > 0;) external_->publish(a, records[a]);
 }
 
 }  // namespace kerf

@@ -198,6 +198,14 @@ void take_command(SegmentServer& server, TickCommands& commands) noexcept {
   commands.last_index = command->index;
 }
 
+/// The newest force that a program has given each arm since the last tick.
+void take_forces(ExternalPage& external, AnyServo& servo) noexcept {
+  ProgramForce force;
+  for (std::size_t a = 0; a < servo.arms(); ++a) {
+    if (external.take(a, force) && !servo.give_force(a, force)) external.refuse(a);
+  }
+}
+
 void count_packets(const Devices& devices, TickTiming& timing) noexcept {
   for (std::size_t a = 0; a < devices.size(); ++a) {
     timing.lost_packets[a] = devices[a].lost();
@@ -219,7 +227,7 @@ void signal_tick(LoopSignals& signals, Tick tick, std::span<const DeviceReport> 
 
 EndReason run_servo(TickSource& clock, const Devices& devices, AnyServo& servo,
                     Publisher& publisher, SegmentServer& server, const LoopLimits& limits,
-                    LoopSignals& signals, RunRecord& record) noexcept {
+                    LoopSignals& signals, RunRecord& record, ExternalPage* external) noexcept {
   EndReason end = EndReason::stopped;
   TickCommands commands;
   const CountedAllocations counted;
@@ -241,6 +249,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, AnyServo& servo,
       reports[a] = devices[a].read();  // newest pose; never blocks
     }
     take_command(server, commands);
+    if (external != nullptr) take_forces(*external, servo);
     commands.missed = missed.next(clock.overruns());
     const char* const stall = stall_before(signals, clock.stood_still());
     commands.fade_in = stall != nullptr;

@@ -133,10 +133,12 @@ inline void send_tick(std::span<const ServoOutput> outputs, const LoopSignals& s
 /// The loop around the servo step: time, devices, step, devices, publication, statistics. Runs on
 /// the calling thread until a limit is met or a stop is requested; the motors are off when it
 /// returns. A device that goes away is a fault of its arm alone, and ends the run if no other is
-/// left. `devices` has one for each arm of the servo.
+/// left. `devices` has one for each arm of the servo. `external`: where a program gives the force,
+/// in a scene of such a force.
 EndReason run_servo(TickSource& clock, const Devices& devices, AnyServo& servo,
                     Publisher& publisher, SegmentServer& server, const LoopLimits& limits,
-                    LoopSignals& signals, RunRecord& record) noexcept;
+                    LoopSignals& signals, RunRecord& record,
+                    ExternalPage* external = nullptr) noexcept;
 
 inline constexpr std::chrono::milliseconds kWatchdogPeriod{5};
 

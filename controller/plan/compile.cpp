@@ -53,6 +53,7 @@ class CompiledSceneOf final : public CompiledScene {
     plan_.stroke_pause_ticks = stroke_pause_ticks(scene.servo.rate_hz, plan_.pedalled);
     plan_volumes(scene, plan_);
     plan_contact(scene, plan_);
+    plan_.external = plan_external<N>(scene);
     plan_.force_cut = plan_force_cut(scene, plan_);
     if (plan_.contact.swept) {
       for (std::size_t v = 0; v < plan_.volume_count; ++v) {
@@ -104,6 +105,12 @@ class CompiledSceneOf final : public CompiledScene {
   }
   bool apply(const ServoCommand& command) noexcept override {
     return apply_command<N>(arms_, command);
+  }
+  [[nodiscard]] bool give_force(std::size_t arm, const ProgramForce& force) noexcept override {
+    return kerf::give_force(*arms_[arm].plan, force, arms_[arm].state->external);
+  }
+  void repeat_force(std::size_t arm, const std::array<float, 3>& contact_n) noexcept override {
+    if (plan_.external.on) kerf::repeat_force(contact_n, arms_[arm].state->external);
   }
   [[nodiscard]] double penetration_mm(std::size_t arm) const noexcept override {
     return kerf::penetration_mm(*arms_[arm].plan, *arms_[arm].state);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <string>
 
@@ -118,6 +119,16 @@ void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
   contact.units_per_mm = Ratio(1 / unit_mm);
   contact.mm_per_unit = Ratio(unit_mm);
   contact.device_mm_per_unit = Ratio(unit_mm / scene.device.workspace_scale);
+}
+
+/// The force of a program: it holds for the scene's time, rounded up to a tick.
+template <class N>
+[[nodiscard]] ExternalPlan<N> plan_external(const LoadedScene& scene) {
+  const double ticks = std::ceil(scene.force.stale_ms * scene.servo.rate_hz / 1000);
+  return {.on = scene.force.model == ForceModel::external,
+          .stale_ticks = static_cast<std::uint32_t>(ticks),
+          .most_stiffness_n_per_mm = scene.force.stiffness_n_per_mm,
+          .most_damping_ns_per_mm = scene.force.damping_ns_per_mm};
 }
 
 /// Frame of a volume in contact space.

@@ -60,6 +60,7 @@ struct Run {
   SegmentWriter& segment;
   SegmentServer& server;
   AnyServo& servo;
+  ExternalPage* external;
   Devices devices;
   std::atomic<bool>& stop;
   RunReport& report;
@@ -153,15 +154,16 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
     auto& all = run.report.missing_rights;
     all.insert(all.end(), missing.begin(), missing.end());
   }
-  Publisher publisher(run.segment, run.servo);
+  Publisher publisher(run.segment, run.servo, run.external);
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
   std::optional<TickGate> gate;
   if (!options.until.empty()) gate.emplace(options.until, run.stop);
   LockStepTicks lock_step(run.devices, kNsPerSecond / run.rate_hz, gate ? &*gate : nullptr);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
   if (calls != nullptr) calls->enter(run.ports);
-  const EndReason end = run_servo(clock, run.devices, run.servo, publisher, run.server,
-                                  limits_of(options, run.rate_hz), signals, run.report.record);
+  const EndReason end =
+      run_servo(clock, run.devices, run.servo, publisher, run.server,
+                limits_of(options, run.rate_hz), signals, run.report.record, run.external);
   if (calls != nullptr) calls->leave();
   return end;
 }
@@ -329,6 +331,17 @@ void explain_faults(const EventList& faults, const std::string& port, const std:
   }
 }
 
+/// Warns if a program gave none, or what is none.
+void tell_of_forces(const ExternalPage& external) {
+  if (external.given() == 0) {
+    log_warning("no program gave a force: examples/external has one to begin with");
+  } else if (external.refused() > 0) {
+    log_warning(std::to_string(external.refused()) + " of " + std::to_string(external.given()) +
+                " forces of the program were refused: a number was not finite, or stiffness or "
+                "damping were above the scene's; give what docs/external.md allows");
+  }
+}
+
 RunReport new_report(const ControllerOptions& options) {
   RunReport report;
   report.end = text_of(EndReason::stopped);
@@ -383,8 +396,9 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
 
   segment.set_lifecycle(Lifecycle::run);
   report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
-  const EndReason end = run_threads({options, start.port_texts, scene, scene.servo.rate_hz, segment,
-                                     start.server, servo, devices, stop, report});
+  const EndReason end =
+      run_threads({options, start.port_texts, scene, scene.servo.rate_hz, segment, start.server,
+                   servo, start.external.get(), devices, stop, report});
   if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
@@ -396,6 +410,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
     name_law_faults(scene, faults, name);
     explain_faults(faults, start.port_texts[arm], name);
   }
+  if (start.external) tell_of_forces(*start.external);
   report.removed_density_mm3 = removed_density_mm3(scene, report.record);
   const std::vector<double> removed = removed_mm3(scene, servo);
   report.removed_mm3 = std::accumulate(removed.begin(), removed.end(), 0.0);

@@ -204,6 +204,9 @@ RunStart::RunStart(const ControllerOptions& options, const std::atomic<bool>& st
               .arms = static_cast<std::uint32_t>(arms_of(planned.scene))}),
       port_texts(ports_of(options, planned.scene)) {
   LoadedScene& scene = planned.scene;
+  if (scene.force.model == ForceModel::external) {
+    external = std::make_unique<ExternalPage>(options.name, arms_of(scene), scene.servo.rate_hz);
+  }
   planned.servo->take(scene);
   try {
     for (std::size_t arm = 0; arm < port_texts.size(); ++arm) {

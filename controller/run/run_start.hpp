@@ -14,6 +14,7 @@
 #include "controller/plan/gain_margin.hpp"
 #include "controller/run/controller_options.hpp"
 #include "controller/run/run_report.hpp"
+#include "shared/external/external_page.hpp"
 #include "shared/segment/segment.hpp"
 #include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
@@ -60,6 +61,7 @@ struct RunStart {
   PlannedScene planned;
   SegmentWriter segment;
   SegmentServer server;
+  std::unique_ptr<ExternalPage> external;  ///< in a scene whose force a program gives
   // By arm:
   std::vector<std::string> port_texts;  ///< those of `--port`, with `auto` resolved
   std::vector<std::unique_ptr<PacketPort>> ports;

@@ -147,7 +147,8 @@ CostReport explain(const LoadedScene& scene, CompiledScene& servo, const Segment
     explanation.ticks.push_back({scene.tools[tick.tool].name, scene.volumes[tick.volume].name,
                                  tick.variant(), tick.choice.why, tick.stages, time});
   }
-  explanation.machine_factor = measured_us / timed_us;
+  // A tick without contact has no operations that have a price.
+  explanation.machine_factor = timed_us > 0 ? measured_us / timed_us : 1;
   return explanation;
 }
 

@@ -103,8 +103,9 @@ struct Material {
 /// The numbers of the loop.
 enum class NumericKind : std::uint8_t { fixed, float64 };
 enum class ForceModel : std::uint8_t {
-  paper,  ///< sum of gradients over the samples of the tool
-  proxy   ///< swept contact of the tool surface, coupled to the hand
+  paper,    ///< sum of gradients over the samples of the tool
+  proxy,    ///< swept contact of the tool surface, coupled to the hand
+  external  ///< a program gives the force, and nothing of the volumes is felt
 };
 /// How material leaves (docs/cutting.md).
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact, preston };
@@ -143,6 +144,7 @@ struct ForceSettings {
   double p0_n_per_mm2 = 0.06;
   double stiffness_n_per_mm = 0.4;
   double damping_ns_per_mm = 0.002;
+  double stale_ms = 20;  ///< of a force of a program
   double friction = 0.0;
   LawChoice law{LawKind::force, "", {}};              ///< if without a name, the coupling
   LawChoice stabiliser{LawKind::stabiliser, "", {}};  ///< if without a name, none
@@ -259,7 +261,7 @@ struct SceneSpec : SceneSettings {
 
 // The words of a scene for the values of an enumeration, in its order: one list for reading a scene
 // and for writing its JSON.
-inline constexpr std::array<std::string_view, 2> kForceModelWords = {"paper", "proxy"};
+inline constexpr std::array<std::string_view, 3> kForceModelWords = {"paper", "proxy", "external"};
 inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
                                                                    "overlap_exact", "preston"};
 inline constexpr std::array<std::string_view, 3> kCutPedalWords = {"auto", "always", "button"};

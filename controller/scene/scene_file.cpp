@@ -271,7 +271,8 @@ Material& material_named(const SceneTable& table, const std::string& name,
 }
 
 void finish_device(const SceneTable& table, SceneSpec& scene) {
-  scene.offset_given = table.has("offset_mm");
+  // Without contact there is no surface to go to.
+  scene.offset_given = table.has("offset_mm") || scene.force.model == ForceModel::external;
   if (table.has("first_tool")) scene.device.tool_place = table.place("first_tool");
   for (const double sign : scene.device.encoder_sign.value_or(std::array{1.0, 1.0, 1.0})) {
     if (std::abs(sign) == 1) continue;
@@ -288,12 +289,18 @@ void finish_device(const SceneTable& table, SceneSpec& scene) {
 }
 
 /// The paper's force has no normal that could cut by force: unless the scene names another model of
-/// cutting, it comes with that of the paper.
+/// cutting, it comes with that of the paper. Of what a program's force cuts, kerf knows nothing.
 void choose_cut(const SceneTable& table, SceneSpec& scene) {
   scene.cut_in_one_tick = table.is_text("rate_per_s");
   if (scene.force.model == ForceModel::paper && !table.has("model")) {
     scene.cut.model = CutModel::overlap;
   }
+  if (scene.force.model != ForceModel::external) return;
+  if (table.has("model") && scene.cut.model != CutModel::none) {
+    refuse(table.place("model"),
+           " cuts by contact, and force.model = \"external\" has none; leave it out");
+  }
+  scene.cut.model = CutModel::none;
 }
 
 /// The overlap models cut every material, forbidden or not.
@@ -393,6 +400,29 @@ void read_lists(const SceneTables& tables, SceneParts& parts) {
     table.read_conditional(parts);
     material = parts.material;
     material.in_scene = true;
+  }
+}
+
+/// A scene for the force of a program needs no volume and no tool, a servo one of each: a ball out
+/// of reach, as in scenes/empty.toml, and a tip to be seen.
+void fill_in(SceneSpec& scene) {
+  if (scene.force.model != ForceModel::external) return;
+  if (scene.volumes.empty()) {
+    VolumeSpec& volume = scene.volumes.emplace_back();
+    volume.where = scene.path;
+    volume.name = "none";
+    volume.file = kPhantomFile;
+    volume.shape = "ball";
+    volume.phantom_size = VoxelGrid{8, 8, 8};
+    volume.iso = 0.5;
+    volume.position_mm = {0, -1000, 0};
+  }
+  if (scene.tools.empty()) {
+    ToolSpec& tool = scene.tools.emplace_back();
+    tool.size_place = scene.path + ": tool";
+    tool.name = "tip";
+    tool.shape = "ball";
+    tool.size.radius_mm = 2;
   }
 }
 
@@ -523,13 +553,13 @@ SceneSpec read_scene(const TomlNode& root, const TomlNode* second,
   scene.path = path.string();
   scene.materials = default_materials();
   read_lists(tables, parts);
-  refuse_empty(scene);
-
   std::vector<SceneTable> once;
   for (const std::string_view name : names_below("", keys)) {
     if (most_of(name) == 0) once.push_back(tables.once(name));
   }
   for (const SceneTable& table : once) table.read(parts);
+  fill_in(scene);
+  refuse_empty(scene);
   choose_cut(tables.once("cut"), scene);
   for (const SceneTable& table : once) table.read_conditional(parts);
   finish_device(tables.once("device"), scene);

@@ -132,6 +132,11 @@ constexpr std::string_view kCutRateWords[] = {"1/T"};
 
 constexpr SceneCondition kPaper{"force.model", "paper"};
 constexpr SceneCondition kProxy{"force.model", "proxy"};
+constexpr SceneCondition kExternal{"force.model", "external"};
+constexpr SceneCondition kCoupled{
+    "force.model", "paper", false,
+    " is of a coupling, and force.model = \"paper\" has none; leave it "
+    "out, or set model = \"proxy\""};
 constexpr SceneCondition kPreston{"cut.model", "preston"};
 constexpr SceneCondition kNoPreston{
     "cut.model", "preston", false,
@@ -261,16 +266,18 @@ constexpr SceneKey kKeys[] = {
      {}, {.default_text = "the first; of a second device the second", .json = InJson::if_changed}},
 
     {"force.model", "", at<&ForceSettings::model>, one_of(kForceModelWords),
-     "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients"},
+     "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients; external: a program gives it, and needs no volume and no tool (docs/external.md)"},
     {"force.p0_n_per_mm2", "N/mm^2", at<&ForceSettings::p0_n_per_mm2>, between(0, 1000),
      "force per mm^2 of surface", kPaper},
     {"force.stiffness_n_per_mm", "N/mm", at<&ForceSettings::stiffness_n_per_mm>,
      between(kMinStiffnessNPerMm, kMaxStiffnessNPerMm),
-     "of the coupling, at the device; how much of it is stable: docs/devices.md, \"Gains\"", kProxy},
+     "of the coupling, at the device; how much of it is stable: docs/devices.md, \"Gains\"; external: the most that a program may ask for", kCoupled},
     {"force.damping_ns_per_mm", "N s/mm", at<&ForceSettings::damping_ns_per_mm>,
-     between(0, kMaxDampingNsPerMm), "of the coupling, at the device", kProxy},
+     between(0, kMaxDampingNsPerMm), "of the coupling, at the device; external: the most that a program may ask for", kCoupled},
+    {"force.stale_ms", "ms", at<&ForceSettings::stale_ms>, between(1, 1000),
+     "how long a program's force holds; then it fades to zero within 15 ms", kExternal},
     {"force.unchecked_gain", "", at<&ForceSettings::unchecked_gain>, {},
-     "true: a device may be held by a contact that its model calls unstable", kProxy,
+     "true: a device may be held by a contact that its model calls unstable", kCoupled,
      {.json = InJson::if_changed}},
     {"force.friction", "", at<&ForceSettings::friction>, between(0, 1),
      "Coulomb coefficient of the tool on the surface", kProxy},
@@ -285,7 +292,7 @@ constexpr SceneKey kKeys[] = {
 
     {"cut.model", "", at<&CutSettings::model>, one_of(kCutModelWords),
      "preston: the force cuts; overlap: what is covered goes at a rate; overlap_exact: the same at any rate",
-     {}, {.default_text = "\"preston\"; with the paper's force \"overlap\""}},
+     {}, {.default_text = "\"preston\"; with the paper's force \"overlap\", with an external one \"none\""}},
     {"cut.pedal", "", at<&CutSettings::pedal>, one_of(kCutPedalWords),
      "always: whatever is pressed cuts; button: only while the device's first button is pressed; auto: button with --pedal, as with a hand that a window leads, else always",
      {}, {.json = InJson::if_changed}},

@@ -86,8 +86,9 @@ struct ServoOutput {
 
 /// A compiled scene that can be stepped, whatever its number type.
 ///
-/// `compile` makes one. `step`, `apply` and `penetration_mm` belong to the servo thread and are the
-/// functions of servo_step.hpp; the rest is constant, or may be read while no step runs.
+/// `compile` makes one. `step`, `apply`, the two of a program's force and `penetration_mm` belong
+/// to the servo thread and are the functions of servo_step.hpp and external_force.hpp; the rest is
+/// constant, or may be read while no step runs.
 class AnyServo {
  public:
   virtual ~AnyServo() = default;
@@ -104,6 +105,10 @@ class AnyServo {
     return output;
   }
   virtual bool apply(const ServoCommand& command) noexcept = 0;
+  /// The force of a program for an arm, from the next step on; of a replay, for the next one.
+  /// External scenes only: others return false, and ignore a replay's.
+  [[nodiscard]] virtual bool give_force(std::size_t arm, const ProgramForce& force) noexcept = 0;
+  virtual void repeat_force(std::size_t arm, const std::array<float, 3>& contact_n) noexcept = 0;
   [[nodiscard]] virtual double penetration_mm(std::size_t arm = 0) const noexcept = 0;
 
   [[nodiscard]] virtual VoxelGrid grid(std::size_t scene_index) const noexcept = 0;

@@ -19,6 +19,7 @@
 #include "controller/kernel/sampling.hpp"
 #include "controller/kernel/spindle.hpp"
 #include "controller/law/law.hpp"
+#include "controller/servo/external_force.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics.hpp"
 #include "controller/servo/supervisor.hpp"
@@ -247,7 +248,8 @@ struct ServoPlan {
   const ExactTaps* taps = nullptr;     ///< of the kernel, for the method `splat`
   const KernelSet* kernels = nullptr;  ///< of this machine
   ContactPlan<N> contact;
-  bool cutting = false;  ///< by overlap, whatever the force
+  ExternalPlan<N> external;  ///< in place of contact
+  bool cutting = false;      ///< by overlap, whatever the force
   RemovalRate<N> removal_rate;
   ForceCutPlan<N> force_cut;  ///< else, by force
 

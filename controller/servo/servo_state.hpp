@@ -16,6 +16,7 @@
 #include "controller/kernel/spindle.hpp"
 #include "controller/law/law.hpp"
 #include "controller/servo/energy_ledger.hpp"
+#include "controller/servo/external_force.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics.hpp"
 #include "controller/servo/servo.hpp"
@@ -155,6 +156,7 @@ struct ServoState {
 
   ContactState<N> contact;     ///< of the swept proxy
   ForceCutState<N> force_cut;  ///< of cutting by force
+  ExternalState<N> external;   ///< of the force of a program
 
   Supervisor supervisor;
   EncoderState encoders;

@@ -225,7 +225,12 @@ ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
     return {state.held_force_n * ratio(stale_fraction(timing, supervisor.stale_ticks),
                                        timing.zero_ticks - timing.hold_ticks)};
   }
-  contact = contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
+  if (plan.external.on) {
+    contact.spring_n = contact.contact_n =
+        external_force(plan, state.external, state.tip_mm, sensed.velocity_mm_per_s);
+  } else {
+    contact = contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
+  }
   if (plan.contact.swept && !(all_finite(contact.contact_n) && all_finite(contact.spring_n))) {
     latch(Fault::force_law, supervisor);
     // What the overlap removed in this tick is gone: it stays counted, and a reset restores it.
@@ -383,6 +388,7 @@ Sensed<N> step_arm(const ServoPlan<N>& plan, ServoState<N>& state, const DeviceR
                    ServoOutput& out) noexcept {
   if (report.fresh) state.pedal_down = !plan.pedalled || report.button1;
   const Sensed<N> sensed = sense(plan, state, report);
+  if (plan.external.on) state.external.follow(plan.external, plan.timing);
   ContactResult<N> contact;
   ForceRequest<N> wanted = wanted_force(plan, state, sensed, contact);
   state.contact_n = contact.contact_n;
@@ -417,6 +423,7 @@ void servo_step(Arms<N> arms, std::span<const DeviceReport> reports,
 template <class N>
 double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept {
   using Real = typename N::Real;
+  if (plan.external.on) return 0;
   if (plan.contact.swept) return as_double(norm(state.proxy_offset_mm));
   const Real length = norm(state.contact_n);
   if (!(length > Real(0))) return 0;

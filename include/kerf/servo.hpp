@@ -60,6 +60,13 @@ class Servo {
   /// the scene lacks, an undo of nothing.
   bool apply(const ServoCommand& command) noexcept;
 
+  /// The force of a program from the next step on, for a scene with `force.model = "external"`.
+  /// Returns false, and changes nothing, for another scene or arm, and for a force that is none
+  /// (`ProgramForce`).
+  ///
+  ///     servo.give_force({.force_n = {0, 0.5F, 0}});
+  bool give_force(const ProgramForce& force, std::size_t arm = 0) noexcept;
+
   /// Volume number `volume` of the scene.
   [[nodiscard]] VoxelView voxels(std::size_t volume) const noexcept;
   /// Hash of all volumes as they are now: `volume_hash` of reports and replays.

@@ -65,6 +65,7 @@ SCENES = {
     "class1": (12, "above", [floor_is_flat, lambda run: not run.flag(FORBIDDEN)]),
     "crown": (20, "side", [goes_round, lambda run: not run.flag(FORBIDDEN)]),
     "empty": (10, None, [lambda run: not run.removed and run.peaks_n[0] == 0]),
+    "external": (10, None, [lambda run: not run.removed and run.peaks_n[0] == 0]),
     "fast": (10, "above", []),
     "fluted_bur": (10, "above", []),
     "low_limits": (10, None, [feels_only, lambda run: not run.flag(CLAMPED)]),

@@ -147,14 +147,16 @@ void check_splat(const ToolCase& in) {
 
 namespace {
 
-/// For the swept proxy without cutting: a tick has only its queries.
+/// For the swept proxy without cutting: a tick has only its queries. For a force of a program it
+/// has none.
 class SurfaceMethod final : public ToolMethod {
  public:
   constexpr SurfaceMethod() noexcept : ToolMethod(Method::surface, "surface", "") {}
 
   [[nodiscard]] std::optional<std::string> serves(const ToolCase& in) const override {
-    if (in.scene.force.model != ForceModel::proxy) return std::nullopt;
+    if (in.scene.force.model == ForceModel::paper) return std::nullopt;
     if (in.scene.cut.model != CutModel::none) return std::nullopt;
+    if (in.scene.force.model == ForceModel::external) return "a program gives the force";
     return "its surface alone is felt, and nothing is cut";
   }
 };

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "kerf/scene.hpp"
+#include "kerf/tick.hpp"
+
+namespace kerf {
+
+/// The last tick of an arm, as a program with a force of its own sees it.
+struct DeviceState {
+  Tick tick = 0;                                  ///< 0: none yet
+  std::uint64_t answers = 0;                      ///< number of the newest force that it had
+  std::array<double, 3> position_mm{};            ///< tip in the scene; NaN until calibrated
+  std::array<double, 4> orientation{0, 0, 0, 1};  ///< quaternion x, y, z, w; NaN until calibrated
+  std::array<double, 3> velocity_mm_per_s{};      ///< NaN until the device was first in hand
+  std::array<double, 3> force_n{};                ///< sent, after all limits
+  Phase phase = Phase::off;
+  Fault fault = Fault::none;
+  std::uint32_t flags = 0;  ///< kFlag..., such as kFlagButton1
+};
+
+/// A haptic device for a force of your own, under kerf's limits: the page of memory that a
+/// controller shares if its scene has `force.model = "external"` (docs/external.md; in C:
+/// kerf/external.h). kerf arms the device, fades the force in, limits it, holds it while this
+/// program is late, fades it out if it is gone, and has the motors off on every way out.
+///
+///     auto device = kerf::Device::open();
+///     while (device.wait()) {
+///       const double depth_mm = -device.state().position_mm[1];
+///       device.give({.force_n = {0, depth_mm > 0 ? 0.4 * depth_mm : 0, 0}});
+///     }
+///
+/// A stiff wall needs a goal with a stiffness, which the servo renders at its own rate, so that
+/// this loop may be as slow as 1 / `force.stale_ms`. One program at a time; one thread.
+class Device {
+ public:
+  /// That of the controller which runs under this name. Throws Error: there is none, its scene has
+  /// another model, or another program gives the force.
+  [[nodiscard]] static Device open(const std::string& name = "kerf");
+  /// Gives the device back: the last force fades out.
+  ~Device();
+  Device(Device&&) noexcept;
+  Device& operator=(Device&&) noexcept;
+
+  [[nodiscard]] std::size_t arms() const noexcept;
+  [[nodiscard]] double period_s() const noexcept;
+
+  /// Waits for a tick that `state` does not have, and takes it, of all arms. Returns false if the
+  /// controller has ended; `state` keeps its last tick. It asks four times a period.
+  bool wait() noexcept;
+  /// The tick that `wait` took; for an arm that is none, one of zeros.
+  [[nodiscard]] const DeviceState& state(std::size_t arm = 0) const noexcept;
+
+  /// What the arm gets from the next tick on; returns its number, which `answers` will reach, or 0
+  /// for an arm that is none. What is no force (`ProgramForce`) the controller refuses and counts.
+  std::uint64_t give(const ProgramForce& force, std::size_t arm = 0) noexcept;
+  /// Forces that the controller refused up to this tick, of all arms.
+  [[nodiscard]] std::uint64_t refused() const noexcept;
+
+ private:
+  struct Parts;
+  explicit Device(std::unique_ptr<Parts> parts) noexcept;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace kerf
