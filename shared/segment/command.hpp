@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <iterator>
 
@@ -30,15 +29,15 @@ struct Command {
   std::uint32_t index = 0;  ///< set by the server: 1, 2, ... in order of acceptance
   std::uint32_t argument = 0;
   std::uint32_t arm = 0;  ///< select_tool: 0 the first, 1 the second; other kinds: 0, act on both
-  double value[4] = {};   ///< finite; no kind uses it yet
-  std::uint64_t reserved1[2] = {};
+  std::uint64_t reserved[6] = {};  ///< 0
 };
 static_assert(sizeof(Command) == 64);
 
 enum class ReplyStatus : std::uint32_t {
   accepted = 0,  ///< queued; applied within `kCommandSlots` ticks
   busy = 1,      ///< queue full, or a bridge waits for another one or for the controller: try again
-  refused = 2,   ///< unknown kind, argument out of range, value not finite, or no right to command
+  refused =
+      2,  ///< unknown kind, argument out of range, a reserved word in use, or no right to command
 };
 
 /// The immediate reply of the server to a command.
@@ -58,10 +57,8 @@ struct CommandLimits {
 
 /// True if `command` may be queued for the servo.
 [[nodiscard]] inline bool is_valid(const Command& command, const CommandLimits& limits) noexcept {
-  if (!std::all_of(std::begin(command.value), std::end(command.value),
-                   [](double v) { return std::isfinite(v); })) {
-    return false;
-  }
+  const auto is_zero = [](std::uint64_t word) { return word == 0; };
+  if (!std::all_of(std::begin(command.reserved), std::end(command.reserved), is_zero)) return false;
   switch (command.kind) {
     case CommandKind::select_tool:
       return command.argument < limits.tools && command.arm < limits.arms;

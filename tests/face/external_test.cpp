@@ -98,6 +98,16 @@ TEST_CASE("a goal pulls as a spring with a damper at the rate of the servo") {
   }
 }
 
+TEST_CASE("after a hold the force fades in") {
+  Loop loop(external());
+  loop.pushed(kUp, 100);
+  REQUIRE(loop.servo.apply({kerf::ServoCommand::Kind::hold, 1}));
+  CHECK(loop.pushed(kUp, 50).commanded_force_n[1] == 0);
+  REQUIRE(loop.servo.apply({kerf::ServoCommand::Kind::hold, 0}));
+  CHECK(loop.pushed(kUp, 1).contact_force_n[1] == doctest::Approx(0.005).epsilon(0.01));
+  CHECK(loop.pushed(kUp, 99).contact_force_n[1] == 0.5F);
+}
+
 TEST_CASE("each of two arms has a force of its own, and one that gets none has none") {
   const kerf::Scene scene = kerf::Scene::parse(
       "[force]\nmodel = \"external\"\n[[device]]\n[[device]]\npersonality = \"omega\"\n", ".");

@@ -220,7 +220,7 @@ TEST_CASE("commands outside the limits are refused before they reach the servo")
   hold.argument = 2;
   CHECK(connection.send(hold).status == ReplyStatus::refused);
   hold.argument = 1;
-  hold.value[2] = std::numeric_limits<double>::quiet_NaN();
+  hold.reserved[2] = 1;
   CHECK(connection.send(hold).status == ReplyStatus::refused);
   Command reset;
   reset.kind = CommandKind::reset;
@@ -230,7 +230,7 @@ TEST_CASE("commands outside the limits are refused before they reach the servo")
   unknown.kind = static_cast<CommandKind>(77);
   CHECK(connection.send(unknown).status == ReplyStatus::refused);
   CHECK(!server.take_command());
-  hold.value[2] = 0;
+  hold.reserved[2] = 0;
   CHECK(connection.send(hold).status == ReplyStatus::accepted);
   CHECK(server.take_command()->kind == CommandKind::hold);
 }
