@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 
 #include "controller/servo/servo.hpp"
@@ -53,7 +52,8 @@ struct ExternalState {
       level = std::min(level + 1, timing.fade_in_ticks);
       return;
     }
-    const std::uint32_t fall_ticks = std::max(1U, timing.zero_ticks - timing.hold_ticks);
+    const std::uint32_t fall_ticks =
+        std::max<std::uint32_t>(1, timing.zero_ticks - timing.hold_ticks);
     level -= std::min(level, (timing.fade_in_ticks + fall_ticks - 1) / fall_ticks);
   }
 };
@@ -62,60 +62,16 @@ struct ExternalState {
 /// number that is not finite, and for a stiffness or a damping below 0 or above the plan's.
 template <class N>
 [[nodiscard]] bool give_force(const ServoPlan<N>& plan, const ProgramForce& given,
-                              ExternalState<N>& state) noexcept {
-  using Real = typename N::Real;
-  const auto within = [](double value, double most) { return value >= 0 && value <= most; };
-  const auto finite = [](double value) { return std::isfinite(value); };
-  if (!plan.external.on || !std::ranges::all_of(given.force_n, finite) ||
-      !std::ranges::all_of(given.goal_mm, finite) ||
-      !within(given.stiffness_n_per_mm, plan.external.most_stiffness_n_per_mm) ||
-      !within(given.damping_ns_per_mm, plan.external.most_damping_ns_per_mm)) {
-    return false;
-  }
-  const auto& [fx, fy, fz] = given.force_n;
-  const auto& [gx, gy, gz] = given.goal_mm;
-  state.force_n = {Real(fx), Real(fy), Real(fz)};
-  const WorldVec<Real> goal_mm = WorldVec<Real>{Real(gx), Real(gy), Real(gz)} - plan.offset_mm;
-  state.goal_mm = {goal_mm.x / plan.workspace_scale, goal_mm.y / plan.workspace_scale,
-                   goal_mm.z / plan.workspace_scale};
-  state.stiffness_n_per_mm = typename N::Ratio(given.stiffness_n_per_mm);
-  state.damping_ns_per_mm = typename N::Unit(given.damping_ns_per_mm);
-  state.age_ticks = 0;
-  state.from_log = false;
-  return true;
-}
+                              ExternalState<N>& state) noexcept;
 
 /// For a replay: the force of the next tick, as contact_force_n of its record has it.
 template <class N>
-void repeat_force(const std::array<float, 3>& contact_n, ExternalState<N>& state) noexcept {
-  using Real = typename N::Real;
-  state.force_n = {Real(double{contact_n[0]}), Real(double{contact_n[1]}),
-                   Real(double{contact_n[2]})};
-  state.from_log = true;
-}
+void repeat_force(const std::array<float, 3>& contact_n, ExternalState<N>& state) noexcept;
 
 /// The force of this tick before limits. A `float` has it exactly.
 template <class N>
 [[nodiscard]] DeviceVec<typename N::Real> external_force(
     const ServoPlan<N>& plan, const ExternalState<N>& state, DeviceVec<typename N::Real> tip_mm,
-    DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
-  using Real = typename N::Real;
-  if (state.from_log) return state.force_n;
-  const Real level = Real(double(state.level)) / Real(double(plan.timing.fade_in_ticks));
-  const auto axis = [&](Real force_n, Real goal, Real tip, Real velocity) {
-    const Real whole_n = force_n + multiply<Real>(state.stiffness_n_per_mm, goal - tip) -
-                         multiply<Real>(state.damping_ns_per_mm, velocity);
-    const Real most(kMostExternalN);
-    const Real bounded_n = std::clamp(whole_n, Real(0) - most, most) * level;
-    if constexpr (N::kIsFixed) {
-      return bounded_n;
-    } else {
-      return Real(static_cast<float>(bounded_n));
-    }
-  };
-  return {axis(state.force_n.x, state.goal_mm.x, tip_mm.x, velocity_mm_per_s.x),
-          axis(state.force_n.y, state.goal_mm.y, tip_mm.y, velocity_mm_per_s.y),
-          axis(state.force_n.z, state.goal_mm.z, tip_mm.z, velocity_mm_per_s.z)};
-}
+    DeviceVec<typename N::Real> velocity_mm_per_s) noexcept;
 
 }  // namespace kerf

@@ -36,8 +36,7 @@ static_assert(sizeof(Command) == 64);
 enum class ReplyStatus : std::uint32_t {
   accepted = 0,  ///< queued; applied within `kCommandSlots` ticks
   busy = 1,      ///< queue full, or a bridge waits for another one or for the controller: try again
-  refused =
-      2,  ///< unknown kind, argument out of range, a reserved word in use, or no right to command
+  refused = 2,   ///< unknown kind, argument or reserved word out of range, or no right to command
 };
 
 /// The immediate reply of the server to a command.
