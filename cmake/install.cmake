@@ -27,7 +27,7 @@ endfunction()
 # libkerf: the objects of all libraries that include/kerf stands before, and the libraries of others that they need.
 set(objects "")
 set(others "")
-foreach(part shared controller record replay hil lab face)
+foreach(part shared arm/inverse3 controller record replay hil lab face)
   kerf_libraries(libraries ${PROJECT_SOURCE_DIR}/${part})
   foreach(library ${libraries})
     get_target_property(type ${library} TYPE)

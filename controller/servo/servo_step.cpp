@@ -184,8 +184,9 @@ struct ForceRequest {
 };
 
 /// The proxy follows a hand that gets no force, so that it is on the same side of every wall when
-/// the force comes back, with a ramp; a program's force fades in then. For a device that rests parked, or has lost its home, the
-/// search starts again. Returns the number of samples that were read.
+/// the force comes back, with a ramp; a program's force fades in then. For a device that rests
+/// parked, or has lost its home, the search starts again. Returns the number of samples that were
+/// read.
 template <class N>
 std::int64_t track_without_force(const ServoPlan<N>& plan, ServoState<N>& state,
                                  const Sensed<N>& sensed) noexcept {
