@@ -48,15 +48,14 @@ void Publisher::publish(Tick tick, std::span<const DeviceReport> reports,
     segment_.set_lifecycle(held ? Lifecycle::hold : Lifecycle::run);
   }
   segment_.begin_tick(tick);
-  std::array<TickRecord, kMaxArms> records;
   const auto publish_box = [&](const ServoOutput& output, std::size_t v, const VoxelBox& box) {
     const std::uint64_t steps = output.removed_by_volume[v] + output.returned_by_volume[v];
     return segment_.publish_box(v, servo_.density(v), box, static_cast<std::uint32_t>(steps),
                                 cause_of(output));
   };
-  make_records(servo_, reports, commands, outputs, removal_hash_, records, publish_box);
+  make_records(servo_, reports, commands, outputs, removal_hash_, records_, publish_box);
   for (std::size_t a = 0; a < outputs.size(); ++a) {
-    TickRecord& record = records[a];
+    TickRecord& record = records_[a];
     record.tick = tick;
     record.start_ns = static_cast<std::uint64_t>(timing.start_ns);
     record.period_error_ns = saturate_i32(timing.late_ns);
@@ -66,10 +65,8 @@ void Publisher::publish(Tick tick, std::span<const DeviceReport> reports,
     record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets[a]);
   }
   // The first arm last: a reader that sees its record finds those of the others.
-  for (std::size_t a = outputs.size(); a-- > 0;) segment_.publish_state(records[a], a);
+  for (std::size_t a = outputs.size(); a-- > 0;) segment_.publish_state(records_[a], a);
   segment_.end_tick(static_cast<std::uint64_t>(timing.heartbeat_ns));
-  if (external_ == nullptr) return;
-  for (std::size_t a = outputs.size(); a-- > 0;) external_->publish(a, records[a]);
 }
 
 }  // namespace kerf

@@ -10,7 +10,6 @@
 #include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo.hpp"
 #include "controller/tick/tick_record.hpp"
-#include "shared/external/external_page.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/segment.hpp"
@@ -33,24 +32,24 @@ struct TickTiming {
 [[nodiscard]] SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json,
                                        std::uint64_t hash);
 
-/// Publishes each tick to the readers of the segment, and to the program that gives the force, if
-/// the scene has it so, after the device has its command.
+/// Publishes each tick to the readers of the segment, after the device has its command.
 ///
 /// Servo thread only; wait-free, no system call, no allocation.
 class Publisher {
  public:
-  Publisher(SegmentWriter& segment, const AnyServo& servo,
-            ExternalPage* external = nullptr) noexcept
-      : segment_(segment), servo_(servo), external_(external) {}
+  Publisher(SegmentWriter& segment, const AnyServo& servo) noexcept
+      : segment_(segment), servo_(servo) {}
 
   /// `reports` and `outputs` by arm.
   void publish(Tick tick, std::span<const DeviceReport> reports, const TickCommands& commands,
                std::span<const ServoOutput> outputs, const TickTiming& timing) noexcept;
+  /// The record of an arm that was published last.
+  [[nodiscard]] const TickRecord& record(std::size_t arm) const noexcept { return records_[arm]; }
 
  private:
   SegmentWriter& segment_;
   const AnyServo& servo_;
-  ExternalPage* external_;                    ///< or null
+  std::array<TickRecord, kMaxArms> records_{};
   bool held_ = false;                         ///< as published
   std::uint64_t removal_hash_ = kFnv1aBasis;  ///< chain over the changed boxes
 };

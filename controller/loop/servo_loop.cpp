@@ -206,6 +206,11 @@ void take_forces(ExternalPage& external, AnyServo& servo) noexcept {
   }
 }
 
+/// The tick for the program, the first arm last: one that sees its tick finds the other's.
+void show_forces(const Publisher& publisher, ExternalPage& external, std::size_t arms) noexcept {
+  for (std::size_t a = arms; a-- > 0;) external.publish(a, publisher.record(a));
+}
+
 void count_packets(const Devices& devices, TickTiming& timing) noexcept {
   for (std::size_t a = 0; a < devices.size(); ++a) {
     timing.lost_packets[a] = devices[a].lost();
@@ -264,6 +269,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, AnyServo& servo,
     send_tick(outputs, signals, devices);  // the devices first,
     const std::int64_t sent_ns = monotonic_ns();
     publisher.publish(tick, reports, commands, outputs, timing);  // then the readers
+    if (external != nullptr) show_forces(publisher, *external, outputs.size());
     statistics.count(tick, outputs,
                      {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
 

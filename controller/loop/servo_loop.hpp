@@ -16,6 +16,7 @@
 #include "controller/loop/tick_source.hpp"
 #include "controller/loop/wait_state.hpp"
 #include "controller/servo/servo.hpp"
+#include "shared/external/external_page.hpp"
 #include "shared/numeric/statistics.hpp"
 #include "shared/segment/server.hpp"
 

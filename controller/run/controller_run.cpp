@@ -154,7 +154,7 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
     auto& all = run.report.missing_rights;
     all.insert(all.end(), missing.begin(), missing.end());
   }
-  Publisher publisher(run.segment, run.servo, run.external);
+  Publisher publisher(run.segment, run.servo);
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
   std::optional<TickGate> gate;
   if (!options.until.empty()) gate.emplace(options.until, run.stop);

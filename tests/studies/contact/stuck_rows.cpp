@@ -368,7 +368,7 @@ struct PressNumber {
 /// Presses that stop and are not repaired: each by a tool with a shaft, of which a part that
 /// touches two faces has one plane (docs/validation.md). They are shown, and fail nothing; one that
 /// cuts again does, until it is taken off this list.
-constexpr PressNumber kOpen[] = {{478, 16}, {483, 0}, {15590, 6}};
+constexpr PressNumber kOpen[] = {{478, 16}, {483, 0}};
 
 /// The outcome of many presses.
 struct Search {
