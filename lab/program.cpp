@@ -31,8 +31,8 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   app.footer("Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.");
   const std::array commands{
       make_zwidth_command(app),   make_sweep_command(app),  make_faults_command(app),
-      make_accuracy_command(app), make_energy_command(app), make_law_command(app),
-      make_bench_command(app),    make_merge_command(app),
+      make_accuracy_command(app), make_energy_command(app), make_laws_command(app),
+      make_bench_command(app),
   };
   return run_chosen(app, commands, "kerf-lab", argc, argv, out, err);
 }

@@ -14,7 +14,7 @@
 namespace kerf::laws {
 namespace {
 
-/// `kerf-lab law`: the laws that this program knows, each tried at its extremes.
+/// `kerf-lab laws`: the laws that this program knows, each tried at its extremes.
 class Command final : public LabCommand {
  public:
   explicit Command(Arguments& program);
@@ -25,7 +25,7 @@ class Command final : public LabCommand {
 };
 
 Command::Command(Arguments& program)
-    : LabCommand(program, "law",
+    : LabCommand(program, "laws",
                  "each force law, velocity estimator and stabiliser at its extremes") {
   app_.option("name", name_, "only this one").shown_as("NAME");
 }
@@ -59,6 +59,6 @@ int Command::run(std::ostream& out) const {
 }  // namespace
 }  // namespace kerf::laws
 
-std::unique_ptr<kerf::LabCommand> kerf::make_law_command(Arguments& program) {
+std::unique_ptr<kerf::LabCommand> kerf::make_laws_command(Arguments& program) {
   return std::make_unique<laws::Command>(program);
 }

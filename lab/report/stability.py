@@ -163,11 +163,11 @@ HOW = """\
 `--law`, `--estimator` and `--stabiliser` also take the laws that a program of yours registers (docs/own-law.md).
 
 A map larger than one machine is cut into shards. Each keeps its finished columns in a part file and goes on from there
-when it is started again; `merge` refuses parts of other seeds, programs or axes, and names what is missing. With GNU
+when it is started again; `--merge` refuses parts of other seeds, programs or axes, and names what is missing. With GNU
 parallel, and as a job array of Slurm (`examples/cluster/zwidth.sbatch`):
 
     parallel ./kerf lab zwidth --rate 250,500,1000,2000 --jobs 1 --shard {}/8 --part zwidth-{}.part ::: {1..8}
-    ./kerf lab merge zwidth-*.part --plot zwidth.svg --csv zwidth.csv --json zwidth.json
+    ./kerf lab zwidth --merge zwidth-*.part --plot zwidth.svg --csv zwidth.csv --json zwidth.json
 
 """
 

@@ -128,6 +128,8 @@ void tell(const Part& part, std::ostream& out) {
   }
 }
 
+constexpr const char* kMapped = "damping,stiffness";
+
 /// `kerf-lab zwidth`: which stiffness and damping a device bears, measured, beside the theory.
 class Command final : public LabCommand {
  public:
@@ -142,10 +144,13 @@ class Command final : public LabCommand {
   [[nodiscard]] bool measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
                              std::ostream& out) const;
   void write_page(std::ostream& out) const;
+  /// Any option of a map that is measured: none of them has a meaning for the page, or for parts.
+  [[nodiscard]] bool chooses_map() const;
+  int merge(std::ostream& out) const;
 
   std::array<std::string, kAxisCount> axes_, option_names_;
-  std::string stiffness_, map_ = "damping,stiffness", shard_ = "1/1", part_, portraits_, page_;
-  std::vector<std::string> cells_;
+  std::string stiffness_, map_ = kMapped, shard_ = "1/1", part_, portraits_, page_;
+  std::vector<std::string> cells_, merge_;
   OutputPaths paths_;
   bool quick_ = false, arm_ = false;
   double seconds_ = 0;
@@ -184,6 +189,10 @@ Command::Command(Arguments& program)
   app_.option("--jobs", jobs_, "threads [all cores]").within(1, 1024);
   app_.option("--shard", shard_, "only part i of n, into --part").shown_as("i/n");
   app_.option("--part", part_, "keep finished columns here, and go on from those that it has")
+      .shown_as("FILE");
+  app_.option("--merge", merge_,
+              "measure nothing: the map of these parts, one of each shard, to the files below")
+      .all_behind()
       .shown_as("FILE");
   paths_.declare(app_);
   app_.option("--portraits", portraits_,
@@ -428,6 +437,24 @@ bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
   return true;
 }
 
+bool Command::chooses_map() const {
+  return std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); }) ||
+         map_ != kMapped || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
+         seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1";
+}
+
+int Command::merge(std::ostream& out) const {
+  if (chooses_map() || quick_ || jobs_ > 0 || !page_.empty() || !part_.empty()) {
+    throw HilError("--merge: its parts have the map; leave all but --csv, --json and --plot out");
+  }
+  const Outputs outputs(paths_, merge_);
+  const Part whole = merge_parts(merge_);
+  if (!paths_.plot.empty()) check_panels(whole.spec);
+  tell(whole, out);
+  outputs.write(whole, out);
+  return 0;
+}
+
 int Command::run(std::ostream& out) const {
   const bool has_outputs =
       !paths_.csv.empty() || !paths_.json.empty() || !paths_.plot.empty() || !part_.empty();
@@ -435,11 +462,9 @@ int Command::run(std::ostream& out) const {
     throw HilError(std::string(page_.empty() ? "--portraits" : "--page") +
                    ": makes no map; leave --csv, --json, --plot and --part out, or run twice");
   }
+  if (!merge_.empty()) return merge(out);
   if (!page_.empty()) {
-    const bool chooses =
-        std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); });
-    if (chooses || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
-        seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1") {
+    if (chooses_map()) {
       throw HilError("--page: its maps are its own; leave all but --quick and --jobs out");
     }
     write_page(out);
@@ -477,39 +502,9 @@ int Command::run(std::ostream& out) const {
   return 0;
 }
 
-/// `kerf-lab merge`: the parts of a map's shards as one map.
-class MergeCommand final : public LabCommand {
- public:
-  explicit MergeCommand(Arguments& program);
-  [[nodiscard]] int run(std::ostream& out) const override;
-
- private:
-  std::vector<std::string> parts_;
-  OutputPaths paths_;
-};
-
-MergeCommand::MergeCommand(Arguments& program)
-    : LabCommand(program, "merge", "the parts of a map (zwidth --shard) as one map") {
-  app_.option("parts", parts_, "part files, one of each shard").required().shown_as("FILE...");
-  paths_.declare(app_);
-}
-
-int MergeCommand::run(std::ostream& out) const {
-  const Outputs outputs(paths_, parts_);
-  const Part whole = merge_parts(parts_);
-  if (!paths_.plot.empty()) check_panels(whole.spec);
-  tell(whole, out);
-  outputs.write(whole, out);
-  return 0;
-}
-
 }  // namespace
 }  // namespace kerf::zwidth
 
 std::unique_ptr<kerf::LabCommand> kerf::make_zwidth_command(Arguments& program) {
   return std::make_unique<zwidth::Command>(program);
-}
-
-std::unique_ptr<kerf::LabCommand> kerf::make_merge_command(Arguments& program) {
-  return std::make_unique<zwidth::MergeCommand>(program);
 }

@@ -298,7 +298,7 @@ Part merge_parts(const std::vector<std::string>& paths) {
   }
   for (std::size_t i = 1; i <= whole.shard.count; ++i) {
     if (seen.contains(i)) continue;
-    throw HilError("merge: shard " + std::to_string(i) + "/" + std::to_string(whole.shard.count) +
+    throw HilError("--merge: shard " + std::to_string(i) + "/" + std::to_string(whole.shard.count) +
                    " is missing; run it, or name its part");
   }
   whole.shard = {};

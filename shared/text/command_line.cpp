@@ -339,6 +339,10 @@ Option& Option::one_each() {
   option_->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   return *this;
 }
+Option& Option::all_behind() {
+  option_->allow_extra_args();
+  return *this;
+}
 Option& Option::needs(Option other) {
   option_->needs(other.option_);
   return *this;

@@ -40,6 +40,8 @@ class Option {
   Option& split_at_commas();
   /// Of a list: one value for each time that it is given.
   Option& one_each();
+  /// Of a list: every value up to the next option, as a shell's pattern gives them.
+  Option& all_behind();
   Option& needs(Option other);
   Option& excludes(Option other);
   /// Taken from the environment if the arguments do not give it.

@@ -50,7 +50,7 @@ NOT_HERE = {
         "KERF_KILLS=", "KERF_WRITE_PAGE=", "./kerf studies ablate"],
     "holds a core for a minute; with other options it runs here or in the tests lab and examples_python": [
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
-        "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab merge", "./kerf sweep"],
+        "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab zwidth --merge", "./kerf sweep"],
     "runs in the test docs_site": ["./kerf docs$"],
     "installs packages and builds": ["./kerf setup$", "./kerf page"],
     "serves until it is ended; the test web has a server of its own": ["python3 -m http.server"],

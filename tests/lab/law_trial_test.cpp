@@ -167,7 +167,7 @@ TEST_CASE("a scene's own law is tried before it runs: what would hang is refused
 
 TEST_CASE("the lab tries one law by its name, and knows all of them") {
   const auto lab = [](const char* name) {
-    const test::LabAnswer answer = test::lab(std::string("law ") + name);
+    const test::LabAnswer answer = test::lab(std::string("laws ") + name);
     return std::to_string(answer.code) + " " + answer.out + answer.err;
   };
   CHECK(lab("fine").find("0 force law fine (fixed): fine in 100000 steps of ") == 0);

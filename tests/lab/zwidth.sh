@@ -41,5 +41,5 @@ else
   # shellcheck disable=SC2086
   parallel --will-cite "$lab" zwidth $map --jobs 1 --shard {}/3 --part shard-{}.part ::: 1 2 3 >/dev/null
 fi
-"$lab" merge shard-*.part --csv merged.csv >/dev/null
+"$lab" zwidth --merge shard-*.part --csv merged.csv >/dev/null
 cmp whole.csv merged.csv

@@ -534,7 +534,7 @@ TEST_CASE("a map has the same bytes on any number of threads and shards, and aft
     REQUIRE(lab(kSmall + std::string("--shard ") + shard + "/3 --part " + part).code == 0);
     parts += " " + part;
   }
-  REQUIRE(lab("merge" + parts + files("merged")).code == 0);
+  REQUIRE(lab("zwidth --merge" + parts + files("merged")).code == 0);
   CHECK(text_of(folder / "one.csv").size() > 500);
   for (const char* end : {".csv", ".json"}) {
     const std::string one = text_of(folder / (std::string("one") + end));
@@ -573,46 +573,46 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
     CHECK(said.err.find(why) != std::string::npos);
     CHECK(std::count(said.err.begin(), said.err.end(), '\n') == 1);
   };
-  refused("merge " + a + " " + b, "seed 2, not the 1");
-  refused("merge " + a, "shard 2/2 is missing");
-  refused("merge " + a + " " + a, "again");
-  refused("merge " + (folder / "none.part").string(), "cannot be read");
+  refused("zwidth --merge " + a + " " + b, "seed 2, not the 1");
+  refused("zwidth --merge " + a, "shard 2/2 is missing");
+  refused("zwidth --merge " + a + " " + a, "again");
+  refused("zwidth --merge " + (folder / "none.part").string(), "cannot be read");
   refused(kSmall + std::string("--hand firm --shard 1/2 --part ") + a, "another map or shard");
   std::string foreign = kept;
   const std::string program = "\"program\":\"";
   foreign.replace(foreign.find(program) + program.size(), 4, "none");
   std::ofstream(b, std::ios::binary) << foreign;
-  refused("merge " + b + " " + c, "another program measured it than");
+  refused("zwidth --merge " + b + " " + c, "another program measured it than");
   refused(kSmall + std::string("--shard 1/2 --part ") + b, "another program measured it, which");
   CHECK(text_of(b) == foreign);
-  refused("merge " + a + " " + c + " --csv " + c, "is a file of this run itself");
+  refused("zwidth --merge " + a + " " + c + " --csv " + c, "is a file of this run itself");
   refused(kSmall + std::string("--shard 1/2 --part ") + a + " --json " + a,
           "is a file of this run itself");
   std::string unknown = kept;  // of a program with a law that this one has not
   unknown.replace(unknown.find("\"axes\":{"), 8, "\"axes\":{\"law\":[\"anothers\"],");
   std::ofstream(b, std::ios::binary) << unknown;
-  refused("merge " + b + " " + c, "b.part: --law: anothers is unknown");
+  refused("zwidth --merge " + b + " " + c, "b.part: --law: anothers is unknown");
   // A version that this is not; a shard that is not done; text that is no part.
   std::string old = kept;
   old.replace(old.find(KERF_VERSION), std::string(KERF_VERSION).size(), "0.0.1");
   std::ofstream(b, std::ios::binary) << old;
-  refused("merge " + b + " " + c, "of version 0.0.1");
+  refused("zwidth --merge " + b + " " + c, "of version 0.0.1");
   std::ofstream(b, std::ios::binary) << kept.substr(0, kept.rfind('\n', kept.size() - 2) + 1);
-  refused("merge " + b + " " + c, "has 2 of its 3 columns");
+  refused("zwidth --merge " + b + " " + c, "has 2 of its 3 columns");
   for (const char* shard : {"[0,0]", "[1,0]", "[3,2]"}) {
     std::string odd = kept;
     odd.replace(odd.find("[1,2]"), 5, shard);
     std::ofstream(b, std::ios::binary) << odd;
-    refused("merge " + b + " " + c, "is no part of a whole");
+    refused("zwidth --merge " + b + " " + c, "is no part of a whole");
   }
   std::string more = kept;
   more.replace(more.find("\"cells\":[["), 10, "\"cells\":[[true,true,false,false,0,0,0],[");
   std::ofstream(b, std::ios::binary) << more;
-  refused("merge " + b + " " + c, "cells for ");
+  refused("zwidth --merge " + b + " " + c, "cells for ");
   std::ofstream(b, std::ios::binary) << "hello\n";
-  refused("merge " + b + " " + c, "line 1");
+  refused("zwidth --merge " + b + " " + c, "line 1");
   std::ofstream(b, std::ios::binary) << "";
-  refused("merge " + b + " " + c, "no part of a map");
+  refused("zwidth --merge " + b + " " + c, "no part of a map");
   CHECK(text_of(a) == kept);
 }
 

@@ -170,7 +170,7 @@ expect 'each option once' offers '--device --help --jobs --out --seconds --set' 
 expect 'those of a test' offers '--junit --preset -R' test -
 expect 'those of a demo' offers '--scene --seconds --serve --set --sheet --size --spacing --stereo' demo --s
 expect 'what the bridge can do' offers '--help --version -h join serve' bridge ''
-expect 'and the lab' offers 'law' lab la
+expect 'and the lab' offers 'laws' lab la
 expect 'the options of what it can do' offers '--quantum --quick' lab zwidth --qu
 expect 'the words of a program' offers 'omega omni' controller --device om
 expect 'nothing of what has no options' offers '' docs ''

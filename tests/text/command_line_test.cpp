@@ -81,6 +81,19 @@ TEST_CASE("options fill what they were declared with") {
   CHECK_FALSE(p.other);
 }
 
+TEST_CASE("an option that takes all behind it ends at the next option; another takes one value") {
+  CommandLine line("Does nothing.", "kerf-nothing", "kerf-nothing 1.2");
+  std::vector<std::string> files, words;
+  bool flag = false;
+  line.option("--files", files, "files").all_behind();
+  line.option("--words", words, "words");
+  line.flag("--flag", flag, "a flag");
+  CHECK(parse(line, {"--files", "a", "b", "--flag"}) == "go on");
+  CHECK(files == std::vector<std::string>{"a", "b"});
+  CHECK(flag);
+  CHECK(parse(line, {"--words", "a", "b"}) != "go on");
+}
+
 TEST_CASE("what is not given keeps what it holds") {
   Program p;
   CHECK(parse(p.line, {}) == "go on");
