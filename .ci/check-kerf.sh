@@ -265,7 +265,7 @@ expect 'reach the visualizer' called '^visualizer.*--stereo --transfer t.toml --
 expect 'with a display they' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --stereo \
   --record v.y4m --out "$lab/out"
 expect 'reach the window, which keeps its files with the others' \
-  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out '
+  called '^visualizer --name [^ ]* --stereo --record v.y4m --out .*/out '
 expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
 expect 'the pointer is the hand' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --hand mouse
 expect 'in the window' called '^visualizer.*--hand-socket [^ ]*/hand '
@@ -307,7 +307,7 @@ expect 'and is told' says 'bridge: ended by signal 11'
 expect 'all of it is cleared up' nothing_survives
 expect 'two machines, anywhere among the options' kerf_gives 0 demo --seconds 2 --set a.b=1 --loss 1 --two-machines \
   --renderer blend --rate 500 --hand h.toml --device falcon --out "$lab/out"
-expect 'with the options of a demo' called '^studies two-machines --scene .*/scenes/phantom.toml --device falcon --hand h.toml --seconds 2 --size 640x480 --loss 1 --headless --controller-word=--set --controller-word=a.b=1 --controller-word=--rate --controller-word=500 --visualizer-word=--renderer --visualizer-word=blend --out '
+expect 'with the options of a demo' called '^studies two-machines --scene .*/scenes/phantom.toml --device falcon --hand h.toml --seconds 2 --loss 1 --headless --controller-word=--set --controller-word=a.b=1 --controller-word=--rate --controller-word=500 --visualizer-word=--renderer --visualizer-word=blend --out '
 expect 'and the same results' says '^kept in .*report.json, 1 frame'
 expect 'nothing survives them' nothing_survives
 expect 'a machine that forbids them says so by its exit code' with FAIL_studies=77 kerf_gives 77 demo --two-machines
