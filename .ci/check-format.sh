@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
-mapfile -t sources < <(find include shared controller record replay arm hil standin lab face visualizer bridge web tests examples -name '*.[ch]pp' | sort)
+mapfile -t sources < <(find include shared controller record replay arm hil standin lab face python visualizer bridge web tests examples -name '*.[ch]pp' | sort)
 status=0
 # Many files to a call: it takes longer to start than to read one. Each line that would change is named.
 # Another version forms otherwise. Debian 13 has none of them; what is changed there is formed on Debian 12.

@@ -36,6 +36,8 @@ lab/run lab/rig lab/accuracy lab/bench lab/stability lab/safety lab/commands lab
 
 face
 
+python/module
+
 visualizer/scene visualizer/scene/simd visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
 visualizer/redraw visualizer/render visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench
 
@@ -43,7 +45,7 @@ bridge/wire bridge/stream bridge/foxglove bridge/igtl bridge/page bridge/net bri
 
 web/absent web
 '
-programs=(include shared controller record replay arm hil standin lab face visualizer bridge web)
+programs=(include shared controller record replay arm hil standin lab face python visualizer bridge web)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'
 
 # includes PATTERN PATH...: the lines below PATH... that include what matches PATTERN.
@@ -163,6 +165,7 @@ broken() {
   includes '<lz4' "${programs[@]}" | grep -vE '^(bridge/wire/compression|record/export/mcap_file).cpp:'
   includes '<hdf5' "${programs[@]}" | grep -v '^record/export/hdf5_export.cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'
+  includes '<pybind11' "${programs[@]}" | grep -v '^python/module/'
   includes '<qrencode' "${programs[@]}" | grep -v '^bridge/serve/serve.cpp:'
 }
 

@@ -111,7 +111,7 @@ install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES controller/device/60-kerf.rules DESTINATION lib/udev/rules.d)
 install(FILES controller/device/invalid.kerf.kerf.metainfo.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)
 install(DIRECTORY examples python DESTINATION ${CMAKE_INSTALL_DOCDIR}
-  PATTERN __pycache__ EXCLUDE)
+  PATTERN __pycache__ EXCLUDE PATTERN python/module EXCLUDE PATTERN python/kerf EXCLUDE PATTERN python/CMakeLists.txt EXCLUDE)
 
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/kerf-dev)

@@ -105,6 +105,10 @@ Hand::Hand(const Scene& scene, std::size_t arm)
 Hand::Hand(const Scene& scene, const std::filesystem::path& script,
            const std::filesystem::path& faults, std::size_t arm)
     : parts_(or_error([&] { return Parts::of(scene, script, faults, arm); })) {}
+Hand::Hand(std::unique_ptr<Parts> parts) noexcept : parts_(std::move(parts)) {}
+Hand Hand::with_faults(const Scene& scene, const std::filesystem::path& faults, std::size_t arm) {
+  return Hand(or_error([&] { return Parts::of(scene, std::nullopt, faults, arm); }));
+}
 Hand::~Hand() = default;
 Hand::Hand(Hand&&) noexcept = default;
 Hand& Hand::operator=(Hand&&) noexcept = default;

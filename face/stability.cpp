@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <thread>
 #include <utility>
 
@@ -112,16 +113,46 @@ SampledLoop device_loop(std::string_view device, double rate_hz) {
 }
 
 LimitCycle run_on_wall(const WallRun& run) {
-  return or_error([&] {
+  return run_on_wall(run, {});
+}
+
+LimitCycle run_on_wall(const WallRun& run, const WallWatch& watch) {
+  std::exception_ptr of_watch;
+  zwidth::SwingWatch shown;
+  if (watch) {
+    shown = [&](const zwidth::SwingTick& tick) {
+      try {
+        watch(tick.tip_mm, tick.mm_per_s);
+      } catch (...) {
+        of_watch = std::current_exception();
+        throw Interrupted();
+      }
+    };
+  }
+  const LimitCycle seen = or_error([&] {
     require_sound(run);
     zwidth::StepCounter ticks;
     try {
       return zwidth::hit_one_axis(case_of(run), run.stiffness_n_per_mm, run.hit_mm_per_s,
-                                  run.seconds, run.seed, ticks);
+                                  run.seconds, run.seed, ticks, shown);
+    } catch (const Interrupted&) {
+      return LimitCycle{};
     } catch (const LawError& error) {
       throw Error("law " + one_line(run.law) + " (or coupling, linear, two_sided), estimator " +
                   one_line(run.estimator) + ":" + error.what());
     }
+  });
+  if (of_watch) std::rethrow_exception(of_watch);
+  return seen;
+}
+
+SampledLoop column_loop(const std::vector<MapAxis>& axes) {
+  return or_error([&] {
+    const std::vector<zwidth::Assignment> all = spec_of("1", axes, {}).columns();
+    if (all.size() != 1) {
+      throw Error("axes: " + std::to_string(all.size()) + " columns; give each axis one value");
+    }
+    return zwidth::subject_of(all.front()).loop;
   });
 }
 
@@ -143,14 +174,17 @@ StabilityMap stability_map(std::string_view stiffness, const std::vector<MapAxis
     const std::size_t threads = options.threads > 0
                                     ? options.threads
                                     : std::max<std::size_t>(1, std::thread::hardware_concurrency());
-    const std::atomic<bool> stop{false};
-    zwidth::measure_columns(spec, wanted, threads, stop,
-                            [&](std::size_t i, zwidth::Column measured, std::uint64_t) {
-                              MapColumn& column = map.columns[i];
-                              column.first_swing_n_per_mm = measured.swing.first_n_per_mm;
-                              column.first_energy_n_per_mm = measured.energy.first_n_per_mm;
-                              column.cells = std::move(measured.cells);
-                            });
+    const std::atomic<bool> never{false};
+    zwidth::measure_columns(
+        spec, wanted, threads, options.stop != nullptr ? *options.stop : never,
+        [&](std::size_t i, zwidth::Column measured, std::uint64_t) {
+          MapColumn& column = map.columns[i];
+          column.first_swing_n_per_mm = measured.swing.first_n_per_mm;
+          column.first_energy_n_per_mm = measured.energy.first_n_per_mm;
+          column.swing_by_seed_n_per_mm = std::move(measured.swing.by_seed_n_per_mm);
+          column.energy_by_seed_n_per_mm = std::move(measured.energy.by_seed_n_per_mm);
+          column.cells = std::move(measured.cells);
+        });
     return map;
   });
 }

@@ -27,7 +27,7 @@ std::uint64_t CountedAllocations::total() noexcept {
 
 }  // namespace kerf
 
-#ifndef KERF_SANITIZED
+#if !defined(KERF_SANITIZED) && !defined(KERF_SHARED_OBJECT)
 // glibc's own names for its allocator; the ordinary names below replace the library's for the whole
 // program, as the C library documents it ("Replacing malloc").
 // NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming)

@@ -7,7 +7,8 @@ namespace kerf {
 
 /// Counts calls of malloc, calloc, realloc and their aligned forms (operator new among them) that
 /// the current thread makes while one of these lives. The allocator is interposed at link time, so
-/// library calls count too. Under sanitizers the counter is off and reads 0.
+/// library calls count too. Under sanitizers, and in a shared object, whose program has an
+/// allocator of its own, the counter is off and reads 0.
 class CountedAllocations {
  public:
   CountedAllocations() noexcept;

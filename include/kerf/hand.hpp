@@ -29,6 +29,9 @@ class Hand {
   /// hil/faults (empty: none).
   Hand(const Scene& scene, const std::filesystem::path& script,
        const std::filesystem::path& faults = {}, std::size_t arm = 0);
+  /// With the scene's own script, and with such faults.
+  [[nodiscard]] static Hand with_faults(const Scene& scene, const std::filesystem::path& faults,
+                                        std::size_t arm = 0);
   ~Hand();
   Hand(Hand&&) noexcept;
   Hand& operator=(Hand&&) noexcept;
@@ -51,6 +54,7 @@ class Hand {
 
  private:
   struct Parts;
+  explicit Hand(std::unique_ptr<Parts> parts) noexcept;
   std::unique_ptr<Parts> parts_;
 };
 

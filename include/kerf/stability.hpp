@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -156,6 +158,11 @@ struct WallRun {
 /// same value gives the same bits. Throws Error for a law or estimator that does not exist.
 [[nodiscard]] LimitCycle run_on_wall(const WallRun& run);
 
+/// The same, and `watch` gets each tick: how far out of the wall the tip is, and its speed
+/// outwards. What it throws ends the run, and comes out as it is.
+using WallWatch = std::function<void(double tip_mm, double mm_per_s)>;
+[[nodiscard]] LimitCycle run_on_wall(const WallRun& run, const WallWatch& watch);
+
 /// An axis of a map and its values, as the options of `kerf lab zwidth`: {"device", "omni,falcon"},
 /// {"damping", "0:0.02:5"} (from:to:count).
 struct MapAxis {
@@ -170,6 +177,8 @@ struct MapColumn {
   /// The lowest stiffness, within 0.5 %, at which a hit of any seed oscillates, or gives energy; 0:
   /// the lowest of all does; infinite: none does.
   double first_swing_n_per_mm = 0, first_energy_n_per_mm = 0;
+  /// The same of each seed alone; one, if the loop's encoders have no steps that it shifts.
+  std::vector<double> swing_by_seed_n_per_mm, energy_by_seed_n_per_mm;
 };
 
 struct StabilityMap {
@@ -182,6 +191,8 @@ struct MapOptions {
   std::uint64_t seed = 1;
   std::size_t seeds = 5;    ///< so many, one after the other
   std::size_t threads = 0;  ///< 0: one for each core; the map is the same
+  /// Ends the map when another thread sets it: columns that are not done then have no cells.
+  const std::atomic<bool>* stop = nullptr;
 };
 
 /// The map of `kerf lab zwidth`, whose options are the axes: `kerf lab zwidth --help` lists names
@@ -190,5 +201,9 @@ struct MapOptions {
 [[nodiscard]] StabilityMap stability_map(std::string_view stiffness,
                                          const std::vector<MapAxis>& axes,
                                          const MapOptions& options = {});
+
+/// The loop of a column: `axes` have one value each, the other ones their standards. So it has the
+/// figures of the emulated device, as maps have. Throws Error.
+[[nodiscard]] SampledLoop column_loop(const std::vector<MapAxis>& axes);
 
 }  // namespace kerf

@@ -51,6 +51,7 @@ class ColumnRun {
     found.last_n_per_mm = 0;
     for (std::size_t i = 0; i < seeds_; ++i) {
       const double first = first_of(rule, i);
+      found.by_seed_n_per_mm.push_back(first);
       found.first_n_per_mm = std::min(found.first_n_per_mm, first);
       found.last_n_per_mm = std::max(found.last_n_per_mm, first);
     }

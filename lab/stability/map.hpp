@@ -43,6 +43,7 @@ struct StabilityBoundary {
   double last_n_per_mm = kNever;  ///< the largest first one of a single seed
   /// Cells above it that are fine again, their lowest and highest; 0: none.
   double re_entry_from_n_per_mm = 0, re_entry_to_n_per_mm = 0;
+  std::vector<double> by_seed_n_per_mm{};  ///< the first one of each seed; not in a map's file
 };
 
 /// One combination of the other axes, at all stiffnesses.

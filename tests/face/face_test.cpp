@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The interface for other programs, by its headers.
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -454,6 +456,30 @@ TEST_CASE("faults of an emulated device reach the servo") {
   CHECK(stale);
 }
 
+TEST_CASE("faults come with the scene's own hand, too") {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "silence.toml")
+      << "[[fault]]\nkind = \"silence\"\nat_s = 0.3\nfor_s = 0.3\n";
+  const kerf::Scene scene =
+      kerf::Scene::load(fs::path(KERF_SCENES) / "touch.toml", {"servo.numeric=\"double\""});
+  kerf::Servo servo(scene), other(scene);
+  kerf::Hand hand = kerf::Hand::with_faults(scene, folder.path() / "silence.toml");
+  kerf::Hand well = kerf::Hand::with_faults(scene, {});
+  kerf::Hand own(scene);
+  bool stale = false;
+  for (int i = 0; i < 2000; ++i) {
+    const kerf::TickRecord& tick = servo.step(hand.next(servo.last()));
+    stale = stale || tick.fault == static_cast<std::uint32_t>(kerf::Fault::stale_input);
+    const kerf::DeviceReport report = own.next(other.last());
+    CHECK(well.next(other.last()).encoder == report.encoder);
+    other.step(report);
+  }
+  CHECK(stale);
+  CHECK(error_of([&] {
+          static_cast<void>(kerf::Hand::with_faults(scene, "nosuch.toml"));
+        }).find("nosuch.toml") != std::string::npos);
+}
+
 TEST_CASE("a hand without a script is led") {
   const kerf::Scene scene = wall();
   kerf::Servo servo(scene);
@@ -535,4 +561,49 @@ TEST_CASE("boundary, run and map agree") {
   CHECK(map.columns[0].first_swing_n_per_mm < 20);
   CHECK(map.columns[1].cells.empty());
   CHECK(map.columns[1].impossible.starts_with("damping 2 N s/mm is above"));
+}
+
+TEST_CASE("a run on a wall shows each tick, and a map each seed") {
+  const std::vector<kerf::MapAxis> axes{{"device", "falcon"}, {"damping", "0.002"}};
+  const kerf::StabilityMap map = kerf::stability_map("5:10:3", axes, {.seeds = 3});
+  const std::vector<double>& seeds = map.columns[0].swing_by_seed_n_per_mm;
+  REQUIRE(seeds.size() == 3);
+  CHECK(std::ranges::min(seeds) == map.columns[0].first_swing_n_per_mm);
+  CHECK(map.columns[0].energy_by_seed_n_per_mm.size() == 3);
+
+  // On both sides of the crossing of the second seed, by the loop of the column: those of the map.
+  kerf::WallRun run{.loop = kerf::column_loop(axes), .damping_ns_per_mm = 0.002};
+  const auto swings = [&](double stiffness_n_per_mm) {
+    run.stiffness_n_per_mm = stiffness_n_per_mm;
+    bool any = false;
+    for (std::uint64_t hit = 0; hit < 3; ++hit) {
+      run.hit_mm_per_s = std::array{0.0, 50.0, 200.0}[hit];
+      run.seed = (std::uint64_t{2} << 32U) + hit;
+      any = any || kerf::run_on_wall(run).swings;
+    }
+    return any;
+  };
+  CHECK(swings(seeds[1]));
+  CHECK_FALSE(swings(seeds[1] / 1.02));
+
+  std::vector<double> tips_mm;
+  run.hit_mm_per_s = 50;
+  const kerf::LimitCycle watched = kerf::run_on_wall(run, [&](double tip_mm, double mm_per_s) {
+    if (tips_mm.empty()) CHECK(mm_per_s == doctest::Approx(-50).epsilon(0.2));
+    tips_mm.push_back(tip_mm);
+  });
+  CHECK(watched.travel_mm == kerf::run_on_wall(run).travel_mm);
+  CHECK(tips_mm.front() < 0.1);
+  CHECK(tips_mm.back() == doctest::Approx(-(0.5 + 0.3) / run.stiffness_n_per_mm).epsilon(0.2));
+  struct Enough {};
+  CHECK_THROWS_AS(static_cast<void>(kerf::run_on_wall(run, [](double, double) { throw Enough(); })),
+                  Enough);
+
+  const std::atomic<bool> stop{true};
+  const kerf::StabilityMap none = kerf::stability_map("5:10:3", axes, {.stop = &stop});
+  CHECK(none.columns[0].cells.empty());
+  CHECK(none.columns[0].impossible.empty());
+  CHECK(error_of([] {
+          static_cast<void>(kerf::column_loop({{"damping", "0,1"}}));
+        }) == "axes: 2 columns; give each axis one value");
 }

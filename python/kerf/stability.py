@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+
+import numpy as np
+
+from . import _kerf
+from .interrupted import Interrupted
+
+DEVICES_OF_MAPS = ("omni", "falcon", "woodenhaptics")
+
+
+@dataclasses.dataclass(frozen=True)
+class Map:
+    """A stability map. Its arrays have one axis for each name in `axes`, in their order, and the stiffness last.
+
+    stiffness_n_per_mm: (K,), N/mm. axes: {name: list of its values as texts}. rests, swings, active, undecided, arithmetic:
+    bool (..., K): the verdict on the worst of all seeds and of hits at 0, 50 and 200 mm/s; see kerf.Verdict. travel_mm, given_mj:
+    float64 (..., K) of that run. first_swing_n_per_mm, first_energy_n_per_mm: float64 (...): the lowest K, within 0.5 %, at which a
+    hit of any seed swings, or gives energy; 0: the lowest of all does; inf: none does. swing_by_seed_n_per_mm,
+    energy_by_seed_n_per_mm: float64 (..., seeds): those of each seed alone. impossible: texts (...): why a column has no cells; empty:
+    it has. Without cells flags are False and numbers NaN."""
+    stiffness_n_per_mm: np.ndarray
+    axes: dict
+    rests: np.ndarray
+    swings: np.ndarray
+    active: np.ndarray
+    undecided: np.ndarray
+    arithmetic: np.ndarray
+    travel_mm: np.ndarray
+    given_mj: np.ndarray
+    first_swing_n_per_mm: np.ndarray
+    first_energy_n_per_mm: np.ndarray
+    swing_by_seed_n_per_mm: np.ndarray
+    energy_by_seed_n_per_mm: np.ndarray
+    impossible: np.ndarray
+
+
+def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, **axes):
+    """A map of which walls rest on a device: `kerf lab zwidth` with the same bits and speed, as arrays.
+
+    stiffness: N/mm, "0.05:50:40" (from:to:count, even in the ratio), or numbers. axes: the options of `kerf lab zwidth --help` by
+    their names: device, damping (N s/mm), rate (Hz), delay (periods), mass (kg), law, estimator and so on; each a value, a list or
+    array, or "from:to:count". The device may also be one of touch, omega and inverse3, alone: by the figures of
+    kerf.device_loop, which is careful about delay and damping, where the lab takes those of the emulated device. seeds: so many of the
+    encoders' steps against the wall, from `seed` on. seconds: to which a run that is still open is followed, at least. threads: 0
+    for all cores; the map is the same. Returns a kerf.Map. Takes seconds to hours (docs/stability.md); Ctrl-C raises
+    kerf.Interrupted with the Map of the columns that are done. Raises kerf.Error."""
+    axes = _device_by_its_figures(axes)
+    names = list(axes)
+    given = [(name, _text(name, axes[name])) for name in names]
+    measured, ended = _kerf.map_of(_text("stiffness", stiffness), given, seconds, seed, seeds, threads)
+    made = _map_of(measured, names)
+    if ended:
+        raise Interrupted(made)
+    return made
+
+
+def _device_by_its_figures(axes):
+    """The axis `device` of the lab knows three; the figures of all are in device_loop."""
+    device = axes.get("device")
+    if not isinstance(device, str) or "," in device or device in DEVICES_OF_MAPS:
+        return axes
+    rates = np.atleast_1d(axes.get("rate", 1000))
+    loop = _kerf.device_loop(device, float(rates[0]) if rates.dtype.kind in "iuf" else 1000)
+    figures = {"mass": loop.mass_kg, "viscous": loop.viscous_ns_per_mm, "friction": loop.coulomb_n, "quantum": loop.quantum_mm,
+               "delay": loop.delay_s / loop.period_s}
+    return {**figures, **{name: value for name, value in axes.items() if name != "device"}}
+
+
+def _loop_of(device, rate_hz):
+    if device in DEVICES_OF_MAPS:
+        return _kerf.column_loop([("device", device), ("rate", _text("rate_hz", rate_hz))])
+    return _kerf.device_loop(device, rate_hz)
+
+
+def _text(name, values):
+    if isinstance(values, str):
+        return values
+    items = np.atleast_1d(np.asarray(values))
+    if items.ndim != 1 or items.dtype.kind not in "iufU":
+        raise _kerf.Error(f"{name}: {values!r}: give a number, a word, a list of them, or from:to:count")
+    return ",".join(str(item) if items.dtype.kind == "U" else repr(item.item()).removesuffix(".0") for item in items)
+
+
+def _map_of(measured, names):
+    columns = measured.columns
+    axes = {name: list(dict.fromkeys(column.values[i] for column in columns)) for i, name in enumerate(names)}
+    # The lab orders axes by a list of its own; here they stand as they were given.
+    place = [tuple(axes[name].index(value) for name, value in zip(names, column.values)) for column in columns]
+    shape = tuple(len(values) for values in axes.values())
+    count = len(measured.stiffness_n_per_mm)
+    seeds = max((len(column.swing_by_seed_n_per_mm) for column in columns), default=1)
+
+    def of_cells(name, empty):
+        out = np.full((*shape, count), empty)
+        for at, column in zip(place, columns):
+            if column.cells:
+                out[at] = [getattr(cell, name) for cell in column.cells]
+        return out
+
+    def of_columns(name, *more):
+        out = np.full((*shape, *more), np.nan)
+        for at, column in zip(place, columns):
+            if column.cells:
+                out[at] = getattr(column, name)
+        return out
+
+    impossible = np.empty(shape, object)
+    for at, column in zip(place, columns):
+        impossible[at] = column.impossible or ("" if column.cells else "not measured")
+    return Map(np.array(measured.stiffness_n_per_mm), axes,
+               *(of_cells(name, False) for name in ("rests", "swings", "active", "undecided", "arithmetic")),
+               *(of_cells(name, np.nan) for name in ("travel_mm", "given_mj")),
+               *(of_columns(name) for name in ("first_swing_n_per_mm", "first_energy_n_per_mm")),
+               *(of_columns(name, seeds) for name in ("swing_by_seed_n_per_mm", "energy_by_seed_n_per_mm")), impossible)
+
+
+@dataclasses.dataclass(frozen=True)
+class Cell:
+    """One run of a hand against a wall. verdict: kerf.Verdict. trajectory: float64 (ticks, 2): the tip out of the wall in mm, its
+    speed outwards in mm/s. period_s: from row to row."""
+    verdict: _kerf.Verdict
+    trajectory: np.ndarray
+    period_s: float
+
+
+def cell(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=1000.0, loop=None, push_n=0.5, hit_mm_per_s=0.0, seconds=60.0,
+         seed=1, law="coupling", estimator="foaw", numeric="fixed", limits=True):
+    """One run of a cell of a map, with what moved: a hand meets a wall at `hit_mm_per_s` and goes on pushing.
+
+    stiffness_n_per_mm, damping_ns_per_mm: of the wall, N/mm and N s/mm. device, rate_hz: whose loop, as in zwidth, unless `loop`, a
+    kerf.SampledLoop, is given. push_n: of the hand, above Coulomb friction, N. seconds: to which a run that is still open is followed. seed: shifts the
+    encoder's steps against the wall; 0: one lies on it. In a map, seed s and hit number h (0, 50, 200 mm/s) have s * 2**32 + h. law:
+    "coupling", "linear", "two_sided", the name of a law, or a function as of Loop.law, which gets the stiffness and damping, too.
+    numeric: "fixed" or "double". limits: peak and slew of the default device. The same values give the same bits. Returns a
+    kerf.Cell. Raises kerf.Error."""
+    if numeric not in ("fixed", "double"):
+        raise _kerf.Error(f"numeric: {numeric!r}; give fixed or double")
+    run = _kerf.WallRun()
+    run.loop = loop if loop is not None else _loop_of(device, rate_hz)
+    run.stiffness_n_per_mm, run.damping_ns_per_mm = stiffness_n_per_mm, damping_ns_per_mm
+    run.push_n, run.hit_mm_per_s, run.seconds, run.seed = push_n, hit_mm_per_s, seconds, seed
+    run.estimator, run.fixed_point, run.limits = estimator, numeric == "fixed", limits
+    function = law if callable(law) else None
+    if function is None:
+        run.law = law
+    verdict, trajectory = _kerf.cell_of(run, function)
+    return Cell(verdict, trajectory, run.loop.period_s)
