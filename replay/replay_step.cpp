@@ -24,8 +24,13 @@ void copy_times(const TickRecord& from, TickRecord& to) noexcept {
 
 }  // namespace
 
-std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded) noexcept {
-  return {report_of(recorded[0]), report_of(recorded[1])};
+std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded,
+                                              const AnyServo& servo) noexcept {
+  std::array<DeviceReport, kMaxArms> reports;
+  for (std::size_t arm = 0; arm < servo.arms(); ++arm) {
+    reports[arm] = report_of(recorded[arm], servo.report_kind(arm));
+  }
+  return reports;
 }
 
 std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& recorded) noexcept {
@@ -33,7 +38,7 @@ std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& r
   for (std::size_t arm = 0; arm < servo.arms(); ++arm) {
     servo.repeat_force(arm, std::to_array(recorded[arm].contact_force_n));
   }
-  const auto reports = reports_of(recorded);
+  const auto reports = reports_of(recorded, servo);
   std::array<ServoOutput, kMaxArms> outputs;
   servo.step(of_arms(reports, servo), of_arms(outputs, servo));
   return outputs;
@@ -45,7 +50,7 @@ ArmRecords ReplayStep::operator()(const ArmRecords& recorded) noexcept {
 
 ArmRecords ReplayStep::of(const ArmRecords& recorded,
                           const std::array<ServoOutput, kMaxArms>& outputs) noexcept {
-  const auto reports = reports_of(recorded);
+  const auto reports = reports_of(recorded, servo_);
   ArmRecords records{};
   make_records(servo_, of_arms(reports, servo_), commands_of(of_arms(recorded, servo_)),
                of_arms(outputs, servo_), volume_chain_, of_arms(records, servo_));

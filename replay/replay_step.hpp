@@ -27,8 +27,9 @@ template <class T>
   return std::span(all).first(servo.arms());
 }
 
-/// The reports in the records of a tick.
-[[nodiscard]] std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded) noexcept;
+/// The reports in the records of a tick, of the servo's devices.
+[[nodiscard]] std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded,
+                                                            const AnyServo& servo) noexcept;
 
 /// Gives the servo the commands and the reports of a recorded tick, in the loop's order; returns
 /// its outputs.

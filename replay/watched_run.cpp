@@ -34,7 +34,7 @@ bool WatchedRun::step() {
   }
   const std::int64_t now = monotonic_ns();
   published_ = std::max(published_ + 1, tick_);
-  const auto reports = reports_of(*recorded);
+  const auto reports = reports_of(*recorded, *run_.servo);
   publisher_.publish(
       published_, of_arms(reports, *run_.servo), commands_of(of_arms(*recorded, *run_.servo)),
       of_arms(std::as_const(outputs), *run_.servo), {.start_ns = now, .heartbeat_ns = now});

@@ -44,7 +44,7 @@ DeviceReport DeviceDriver::read() noexcept {
 /// Only the position counts: gimbal and buttons have sensors of their own, which may go on without
 /// it. Once it counts as standing still, that lasts while the force fades too.
 void DeviceDriver::follow_change(const DeviceReport& before) noexcept {
-  const bool changed = last_.fresh && last_.encoder != before.encoder;
+  const bool changed = last_.fresh && last_.counts != before.counts;
   const bool is_still = still_reads_ >= most_still_reads_;
   if (changed || !(pushing_ || (forcing_ && is_still))) {
     still_reads_ = 0;
@@ -97,7 +97,7 @@ bool FalconDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
   const auto said = falcon::decode_report(packet);
   if (!said) return false;
   homed_ = std::ranges::all_of(said->homed, [](bool homed) { return homed; });
-  report.encoder = said->encoder;
+  report.counts = said->encoder;
   report.button1 = (said->buttons & falcon::kButtonForward) != 0;
   report.button2 = (said->buttons & falcon::kButtonPlus) != 0;
   report.parked = (said->buttons & falcon::kButtonCentre) != 0;
@@ -175,7 +175,7 @@ bool OmniDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report
   if (!said) return false;
   if (!numbers_.is_newest(said->counter, silent_reads_)) return false;
   lost_ = numbers_.missing();
-  report.encoder = said->encoder;
+  report.counts = said->encoder;
   report.wiper_a = said->pot_a;
   report.wiper_b = said->pot_b;
   report.button1 = said->button1;
@@ -215,11 +215,9 @@ bool CartesianDriver::take(std::span<const std::uint8_t> packet, DeviceReport& r
   if (!numbers_.is_newest(said->number, silent_reads_)) return false;
   lost_ = numbers_.missing();
   newest_ = said->number;
-  report.encoder = counts;
-  for (std::size_t i = 0; i < 3; ++i) {
-    report.wiper_a[i] = static_cast<std::uint16_t>(said->orientation[i]);
-  }
-  report.wiper_b = {static_cast<std::uint16_t>(said->orientation[3]), 0, 0};
+  report.kind = DeviceReport::Kind::pose;
+  report.counts = counts;
+  report.orientation = said->orientation;
   report.button1 = said->button1;
   report.button2 = said->button2;
   report.parked = said->parked;
@@ -291,7 +289,7 @@ bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
     set_sent_ = false;
   }
   at_home_ = at_home_ && in_pose;
-  report.encoder = joints_;
+  report.counts = joints_;
   report.button1 = wooden::wireless_button(said->encoder[3]);
   report.parked = button_ || set_sent_ || at_home_;
   report.homed = homed_;

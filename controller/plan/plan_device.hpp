@@ -176,7 +176,7 @@ void plan_device(const DeviceSettings& device, ServoPlan<N>& plan) {
       arm.joints[i].angle_per_count = joints[i].rad_per_count;
     }
     if (!device.torque_scale) continue;
-    arm.joints[i].counts_per_n_mm = Real(joints[i].motor_sign / (*device.torque_scale)[i]);
+    arm.joints[i].counts_per_effort = Real(joints[i].motor_sign / (*device.torque_scale)[i]);
   }
 }
 

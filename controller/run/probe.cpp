@@ -48,7 +48,7 @@ void ProbeView::take(const DeviceReport& report, std::int64_t now_ns) noexcept {
   }
   if (seen_.reports > 0) {
     for (std::size_t i = 0; i < 3; ++i) {
-      travelled_[i] += static_cast<std::int16_t>(report.encoder[i] - last_.encoder[i]);
+      travelled_[i] += static_cast<std::int16_t>(report.counts[i] - last_.counts[i]);
       seen_.lowest[i] = std::min(seen_.lowest[i], travelled_[i]);
       seen_.highest[i] = std::max(seen_.highest[i], travelled_[i]);
     }
@@ -78,9 +78,9 @@ std::string ProbeView::line() const {
   }
   char text[128];
   std::snprintf(text, sizeof text, "counts %6d %6d %6d  tip %s  buttons %c%c  %s%s",
-                last_.encoder[0], last_.encoder[1], last_.encoder[2], tip,
-                last_.button1 ? '1' : '-', last_.button2 ? '2' : '-',
-                last_.parked ? "parked" : "in hand", last_.homed ? "" : ", not homed");
+                last_.counts[0], last_.counts[1], last_.counts[2], tip, last_.button1 ? '1' : '-',
+                last_.button2 ? '2' : '-', last_.parked ? "parked" : "in hand",
+                last_.homed ? "" : ", not homed");
   return text;
 }
 
@@ -266,7 +266,7 @@ Json report_of(const ControllerOptions& options, const DeviceSettings& device,
           {"lost_packets", driver.lost()},
           {"refused_packets", driver.refused()},
           {"link", link},
-          {"counts", view.last().encoder},
+          {"counts", view.last().counts},
           {"lowest_travel_counts", seen.lowest},
           {"highest_travel_counts", seen.highest},
           {"buttons_pressed", seen.pressed},

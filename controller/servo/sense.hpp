@@ -81,32 +81,24 @@ inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& dev
   encoders.silent_ticks = 0;
   bool at_rest = report.parked && report.homed;
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto step = static_cast<std::int16_t>(report.encoder[i] - encoders.last[i]);
+    const auto step = static_cast<std::int16_t>(report.counts[i] - encoders.last[i]);
     constexpr std::int64_t kEnd = std::numeric_limits<std::int32_t>::max();  // either sign fits
     encoders.unwrapped[i] = static_cast<std::int32_t>(
         std::clamp(std::int64_t{encoders.unwrapped[i]} + step, -kEnd, kEnd));
     // The position of a Cartesian device is whole in its counts, so it is taken, not summed up.
-    if (is_cartesian(device.personality)) encoders.unwrapped[i] = report.encoder[i];
-    encoders.last[i] = report.encoder[i];
+    if (is_cartesian(device.personality)) encoders.unwrapped[i] = report.counts[i];
+    encoders.last[i] = report.counts[i];
     const auto moved =
-        absolute ? step : static_cast<std::int16_t>(report.encoder[i] - encoders.rest_from[i]);
+        absolute ? step : static_cast<std::int16_t>(report.counts[i] - encoders.rest_from[i]);
     at_rest = at_rest && moved >= -device.rest_counts && moved <= device.rest_counts;
   }
-  if (!at_rest) encoders.rest_from = report.encoder;
+  if (!at_rest) encoders.rest_from = report.counts;
   encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
   if (encoders.rest_ticks < timing.rest_ticks) return Rest::none;
-  if (!fits_dock(report.encoder, device.dock_counts, encoders)) return Rest::elsewhere;
+  if (!fits_dock(report.counts, device.dock_counts, encoders)) return Rest::elsewhere;
   encoders.unwrapped = {};
-  if (absolute) std::ranges::copy(report.encoder, encoders.unwrapped.begin());
+  if (absolute) std::ranges::copy(report.counts, encoders.unwrapped.begin());
   return Rest::docked;
-}
-
-/// The orientation that a Cartesian device reports, in the words of the wipers.
-[[nodiscard]] inline std::array<std::int16_t, 4> orientation_of(
-    const DeviceReport& report) noexcept {
-  return {
-      static_cast<std::int16_t>(report.wiper_a[0]), static_cast<std::int16_t>(report.wiper_a[1]),
-      static_cast<std::int16_t>(report.wiper_a[2]), static_cast<std::int16_t>(report.wiper_b[0])};
 }
 
 /// Adds a reading to the sum over the last `samples` readings, 1 to kMaxGimbalSamples.
@@ -237,7 +229,7 @@ template <class N>
   seen.misplaced = rest == Rest::elsewhere;
   if (report.fresh) {
     if (is_cartesian(plan.device.personality)) {
-      state.gimbal.orientation = orientation_of(report);
+      state.gimbal.orientation = report.orientation;
     } else {
       follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);
     }

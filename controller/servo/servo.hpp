@@ -95,6 +95,8 @@ class AnyServo {
 
   /// 1 or 2; constant.
   [[nodiscard]] virtual std::size_t arms() const noexcept = 0;
+  /// Of the reports that the device of an arm gives; constant.
+  [[nodiscard]] virtual DeviceReport::Kind report_kind(std::size_t arm) const noexcept = 0;
   /// One tick of all arms; both spans have one element for each arm.
   virtual void step(std::span<const DeviceReport> reports,
                     std::span<ServoOutput> outputs) noexcept = 0;

@@ -111,8 +111,9 @@ template <class N>
 struct JointPlan {
   typename N::Angle home_rad;          ///< where the count is 0; not of a Cartesian device
   AnglePerCount<N> angle_per_count{};  ///< signed by the encoder's direction
-  /// Motor counts per torque, signed; of a Cartesian device, per force along an axis in N.
-  typename N::Real counts_per_n_mm{};
+  /// Motor counts per effort, signed: N mm of a joint's torque; N along an axis of a Cartesian
+  /// device.
+  typename N::Real counts_per_effort{};
 };
 
 /// Most readings of the gimbal that are summed: 20 ms at 8 kHz, the highest rate.

@@ -43,7 +43,7 @@ template <class N>
     std::array<std::int64_t, 3> wide{};
     std::int64_t largest = end << kBits;
     for (std::size_t i = 0; i < 3; ++i) {
-      wide[i] = std::int64_t{torque[i].raw()} * plan.device.joints[i].counts_per_n_mm.raw();
+      wide[i] = std::int64_t{torque[i].raw()} * plan.device.joints[i].counts_per_effort.raw();
       largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
     }
     // end / largest with 30 fraction bits: 14 bits of end and 48 more. No product exceeds end with
@@ -59,7 +59,7 @@ template <class N>
     std::array<Real, 3> wide{};
     Real largest = end;
     for (std::size_t i = 0; i < 3; ++i) {
-      wide[i] = torque[i] * plan.device.joints[i].counts_per_n_mm;
+      wide[i] = torque[i] * plan.device.joints[i].counts_per_effort;
       largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
     }
     command.scale = end / largest;

@@ -70,11 +70,15 @@ void put_pose(const ServoOutput& output, TickRecord& record) noexcept {
 }
 
 void put_raw(const DeviceReport& report, TickRecord& record) noexcept {
-  for (std::size_t i = 0; i < 3; ++i) {
-    record.raw[kRawEncoder + i] = report.encoder[i];
-    record.raw[kRawPot + i] = report.wiper_a[i];
-    record.raw[kRawPot + 3 + i] = report.wiper_b[i];
+  std::array<std::uint16_t, 6> words{};
+  if (report.kind == DeviceReport::Kind::pose) {
+    std::ranges::transform(report.orientation, words.begin(),
+                           [](std::int16_t part) { return static_cast<std::uint16_t>(part); });
+  } else {
+    std::ranges::copy(report.wiper_b, std::ranges::copy(report.wiper_a, words.begin()).out);
   }
+  for (std::size_t i = 0; i < 3; ++i) record.raw[kRawEncoder + i] = report.counts[i];
+  for (std::size_t i = 0; i < words.size(); ++i) record.raw[kRawPot + i] = words[i];
   record.raw[kRawStatus] = (report.button1 ? 1 : 0) | (report.button2 ? 2 : 0) |
                            (report.parked ? 4 : 0) | (report.homed ? 0 : 8);
   record.raw[kRawDeviceCounter] = static_cast<std::int32_t>(report.counter);
@@ -135,13 +139,18 @@ TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
   return record;
 }
 
-DeviceReport report_of(const TickRecord& record) noexcept {
+DeviceReport report_of(const TickRecord& record, DeviceReport::Kind kind) noexcept {
   DeviceReport report;
+  report.kind = kind;
   const auto& raw = record.raw;
   for (std::size_t i = 0; i < 3; ++i) {
-    report.encoder[i] = static_cast<std::int16_t>(raw[kRawEncoder + i]);
+    report.counts[i] = static_cast<std::int16_t>(raw[kRawEncoder + i]);
+    if (kind == DeviceReport::Kind::pose) continue;
     report.wiper_a[i] = static_cast<std::uint16_t>(raw[kRawPot + i]);
     report.wiper_b[i] = static_cast<std::uint16_t>(raw[kRawPot + 3 + i]);
+  }
+  for (std::size_t i = 0; i < 4 && kind == DeviceReport::Kind::pose; ++i) {
+    report.orientation[i] = static_cast<std::int16_t>(raw[kRawPot + i]);
   }
   report.fresh = record.stale == 0;
   report.button1 = (raw[kRawStatus] & 1) != 0;

@@ -57,7 +57,7 @@ inline bool apply_commands(const TickCommands& commands, AnyServo& servo) noexce
 [[nodiscard]] TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
                                    const ServoOutput& output) noexcept;
 /// The report in a record, and what `record_of` was given as commands.
-[[nodiscard]] DeviceReport report_of(const TickRecord& record) noexcept;
+[[nodiscard]] DeviceReport report_of(const TickRecord& record, DeviceReport::Kind kind) noexcept;
 [[nodiscard]] TickCommands commands_of(const TickRecord& record) noexcept;
 /// The same of a tick with the records of all arms.
 [[nodiscard]] TickCommands commands_of(std::span<const TickRecord> records) noexcept;

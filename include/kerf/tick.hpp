@@ -18,20 +18,25 @@ using Tick = std::uint64_t;  ///< count of servo steps; 0 is the state before th
 /// Report of the device in this tick: raw counts, not angles. The only input of the servo step
 /// besides commands, and so the input of a replay.
 ///
-/// A Cartesian device has the position in `encoder`, in counts of its `step_um`
-/// (docs/devices.md), and the orientation as a quaternion of 16-bit numbers: x, y, z in
-/// `wiper_a`, w in `wiper_b[0]`.
+/// It is of one kind: counts of joints and gimbal, or a pose, as a Cartesian device reports it
+/// (docs/devices.md).
 ///
 /// `parked` means that the device is not in use: the stylus is in the inkwell (Omni, Touch), the
 /// centre button of the grip is held (Falcon), the arm has not left the home pose since its
 /// calibration button was pressed (WoodenHaptics), or a button is held (Inverse3, omega). Parking
 /// at rest calibrates the device; motors stay off while it is parked.
 struct DeviceReport {
-  bool fresh = false;                      ///< false: nothing arrived since the last tick
-  std::array<std::int16_t, 3> encoder{};   ///< counts, wrap at 16 bits
-  std::array<std::uint16_t, 3> wiper_a{};  ///< gimbal pots, both wipers; zero without a gimbal
+  enum class Kind : std::uint8_t { joints, pose };
+
+  bool fresh = false;  ///< false: nothing arrived since the last tick
+  Kind kind = Kind::joints;
+  /// Of the joints' encoders, which wrap at 16 bits; of a pose: its position, in steps of the
+  /// device (`step_um`).
+  std::array<std::int16_t, 3> counts{};
+  std::array<std::uint16_t, 3> wiper_a{};  ///< joints: gimbal pots, both wipers; zero without one
   std::array<std::uint16_t, 3> wiper_b{};
-  bool button1 = false, button2 = false;  ///< pressed
+  std::array<std::int16_t, 4> orientation{};  ///< pose: quaternion x, y, z, w; 32767 is 1
+  bool button1 = false, button2 = false;      ///< pressed
   bool parked = false;
   bool homed = true;          ///< false: absolute encoders have no meaning yet
   std::uint32_t counter = 0;  ///< packet counter of the device, else of the driver

@@ -54,7 +54,7 @@ class KinematicOmni {
       report.wiper_b[i] = static_cast<std::uint16_t>(kWipers - wiper_[i]);
       const double turned = (joints[i] - omni::kDockRad[i]) / omni::kRadPerCount;
       const auto counts = kPowerUp[i] + omni::kEncoderSign[i] * std::lround(turned);
-      report.encoder[i] = static_cast<std::int16_t>(counts);  // wraps as the device does
+      report.counts[i] = static_cast<std::int16_t>(counts);  // wraps as the device does
     }
     return report;
   }
@@ -136,16 +136,20 @@ class KinematicHand {
     report.parked = parked;
     report.counter = ++counter_;
     for (std::size_t i = 0; i < 3; ++i) {
-      report.wiper_a[i] = wiper_[i];
-      report.wiper_b[i] = static_cast<std::uint16_t>(kWipers - wiper_[i]);
-      report.encoder[i] =
+      report.counts[i] =
           static_cast<std::int16_t>(std::llround(counts[i]));  // wraps as encoders do
     }
     if (is_cartesian(device_.personality)) {
       // The share of a pot as a turn about the shaft, from -90 to 90 degrees.
       const double half = (wiper_[0] / static_cast<double>(kWipers) - 0.5) * std::numbers::pi / 2;
-      report.wiper_a = {0, orientation_word(std::sin(half)), 0};
-      report.wiper_b = {orientation_word(std::cos(half)), 0, 0};
+      report.kind = DeviceReport::Kind::pose;
+      report.orientation = {0, orientation_part(std::sin(half)), 0,
+                            orientation_part(std::cos(half))};
+      return report;
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      report.wiper_a[i] = wiper_[i];
+      report.wiper_b[i] = static_cast<std::uint16_t>(kWipers - wiper_[i]);
     }
     return report;
   }
@@ -153,9 +157,8 @@ class KinematicHand {
   void turn_wrist(double share) { wiper_.fill(static_cast<std::uint16_t>(share * kWipers)); }
 
  private:
-  [[nodiscard]] static std::uint16_t orientation_word(double part) {
-    return static_cast<std::uint16_t>(
-        static_cast<std::int16_t>(std::lround(part * cartesian::kQuaternionOne)));
+  [[nodiscard]] static std::int16_t orientation_part(double part) {
+    return static_cast<std::int16_t>(std::lround(part * cartesian::kQuaternionOne));
   }
 
   static constexpr std::uint16_t kWipers = 0xfffe;

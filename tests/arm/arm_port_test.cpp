@@ -79,7 +79,7 @@ TEST_CASE("arm port: a driver above it reads poses and gives forces; the end of 
   CHECK(port->wait(0));
   const kerf::DeviceReport read = driver->read();
   CHECK((read.fresh && read.homed && read.parked));
-  CHECK(read.encoder[0] == 400);
+  CHECK(read.counts[0] == 400);
   CHECK(driver->lost() == 0);  // four reports in one tick are none lost
   kerf::ServoOutput output;
   output.phase = kerf::Phase::active;

@@ -92,7 +92,7 @@ TEST_CASE("omni: the newest of several waiting reports counts, and none is not f
   }
   const auto report = omni.driver.read();
   CHECK(report.fresh);
-  CHECK(report.encoder[0] == 30);
+  CHECK(report.counts[0] == 30);
   CHECK(omni.driver.lost() == 0);
   CHECK_FALSE(omni.driver.read().fresh);
 }
@@ -114,7 +114,7 @@ TEST_CASE("omni: losses are counted by the device's counter, a long gap when its
     for (const std::uint32_t counter : counters) {
       omni.push(counter, static_cast<std::int16_t>(counter % 1000));
     }
-    CHECK(omni.driver.read().encoder[0] == counters.back() % 1000);
+    CHECK(omni.driver.read().counts[0] == counters.back() % 1000);
     CHECK(omni.driver.lost() == lost);
   }
 }
@@ -133,7 +133,7 @@ TEST_CASE("omni: what counts elsewhere is believed after 20 ms of the fastest se
         REQUIRE_FALSE(omni.driver.read().fresh);
       }
       omni.push(counter, 3);
-      CHECK(omni.driver.read().encoder[0] == 3);
+      CHECK(omni.driver.read().counts[0] == 3);
       CHECK(omni.driver.lost() == 0);
     }
   }
@@ -163,7 +163,7 @@ TEST_CASE("omni: an old or repeated packet does not move the tip back") {
   omni.push(10, 100);
   omni.push(9, 90);
   omni.push(10, 91);
-  CHECK(omni.driver.read().encoder[0] == 100);
+  CHECK(omni.driver.read().counts[0] == 100);
   CHECK(omni.driver.refused() == 2);
   CHECK(omni.driver.lost() == 0);
 }
@@ -252,7 +252,7 @@ TEST_CASE("falcon: reports carry counts, buttons and homing of all three axes") 
   Falcon falcon;
   const auto report = falcon.receive(
       {.encoder = {512, -3, -512}, .buttons = kerf::falcon::kButtonCentre, .homed = kHomed});
-  CHECK(report.encoder == Counts{512, -3, -512});
+  CHECK(report.counts == Counts{512, -3, -512});
   CHECK(report.parked);
   CHECK(report.homed);
   const auto later =
@@ -314,7 +314,7 @@ TEST_CASE("wooden: an encoder of the other sign is turned with its motor and its
   static_cast<void>(arm.read({30, -40, 50}, true));
   CHECK(arm.encoders_set() == Encoders{0, 0, -6000, 0, 0, 0});
   CHECK(arm.read({0, 0, -6000}).homed);
-  CHECK(arm.read({400, 1000, -32768}).encoder == Counts{400, -1000, -32768});  // wraps
+  CHECK(arm.read({400, 1000, -32768}).counts == Counts{400, -1000, -32768});  // wraps
   arm.driver.command(forcing({500, -500, 0}));
   CHECK(arm.arm().milliamps == Counts{500, 500, 0});
   static_cast<void>(arm.read({400, 1000, -5000}, true));  // in use counts are kept as they came
@@ -358,9 +358,9 @@ TEST_CASE("cartesian: positions come in steps to nearest, and none that would wr
     touch.port.push(kerf::encode(report));
     return touch.driver.read();
   };
-  CHECK(read(1234, 1).encoder == Counts{123, -123, 0});
-  CHECK(read(1235, 2).encoder == Counts{124, -124, 0});
-  CHECK(read(327'674, 3).encoder == Counts{32767, -32767, 0});
+  CHECK(read(1234, 1).counts == Counts{123, -123, 0});
+  CHECK(read(1235, 2).counts == Counts{124, -124, 0});
+  CHECK(read(327'674, 3).counts == Counts{32767, -32767, 0});
   CHECK(read(327'674, 4).homed);
   CHECK_FALSE(read(327'675, 5).fresh);
   CHECK_FALSE(read(1'000'000, 6).fresh);
@@ -379,8 +379,8 @@ TEST_CASE("cartesian: orientation, buttons and states arrive; without power it i
   report.button1 = report.parked = report.homed = true;
   arm.port.push(kerf::encode(report));
   const kerf::DeviceReport unpowered = arm.driver.read();
-  CHECK(unpowered.wiper_a == std::array<std::uint16_t, 3>{1, 0xfffe, 3});
-  CHECK(unpowered.wiper_b == std::array<std::uint16_t, 3>{32767, 0, 0});
+  CHECK(unpowered.kind == kerf::DeviceReport::Kind::pose);
+  CHECK(unpowered.orientation == std::array<std::int16_t, 4>{1, -2, 3, 32767});
   CHECK((unpowered.button1 && !unpowered.button2 && unpowered.parked && !unpowered.homed));
   report.number = 2;
   report.powered = report.button2 = true;

@@ -128,16 +128,17 @@ void change(Bytes& in, kerf::KinematicOmni& arm, kerf::DeviceReport& report) {
       report = arm.at(in.next() / 16.0 - 8, in.next() / 16.0 - 3, in.next() / 16.0 - 8);
       break;
     case 1:
-      for (std::int16_t& counts : report.encoder) {
+      for (std::int16_t& counts : report.counts) {
         counts = static_cast<std::int16_t>(counts + static_cast<std::int8_t>(in.next()));
       }
       break;
     case 2:
-      for (std::int16_t& counts : report.encoder) counts = static_cast<std::int16_t>(in.wide());
+      for (std::int16_t& counts : report.counts) counts = static_cast<std::int16_t>(in.wide());
       break;
     case 3:
       for (std::uint16_t& wiper : report.wiper_a) wiper = in.wide();
       for (std::uint16_t& wiper : report.wiper_b) wiper = in.wide();
+      for (std::int16_t& part : report.orientation) part = static_cast<std::int16_t>(in.wide());
       break;
     default:  // the same again
       break;

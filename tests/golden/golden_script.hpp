@@ -75,7 +75,7 @@ constexpr DeviceReport scripted_report(std::int32_t tick) noexcept {
     std::int32_t counts = (kWork[i] + triangle(tick, kPeriod[i], kSwing[i])) * share / kTravelTicks;
     if (tick == kJerkTick) counts += 90;
     if (!report.parked) counts += noise(29 + i, 1);
-    report.encoder[i] = static_cast<std::int16_t>(kPowerUp[i] + counts);
+    report.counts[i] = static_cast<std::int16_t>(kPowerUp[i] + counts);
     const std::int32_t turned = triangle(tick, 3 * kPeriod[2 - i], 9'000);
     report.wiper_a[i] = static_cast<std::uint16_t>(32'768 + turned + noise(20 + i, 31));
     report.wiper_b[i] = static_cast<std::uint16_t>(32'768 - turned + noise(10 + i, 31));

@@ -71,7 +71,7 @@ TEST_CASE("a device that says nothing for more than 5 ms, or moves, has to rest 
       const double gap_from_ms = resting.now_ms();
       if (moves) {
         DeviceReport report = resting.arm.docked();
-        report.encoder[1] = static_cast<std::int16_t>(report.encoder[1] + 3);
+        report.counts[1] = static_cast<std::int16_t>(report.counts[1] + 3);
         static_cast<void>(resting.servo->step(report));
       } else {
         while (resting.now_ms() < gap_from_ms + 8) REQUIRE(resting.tick(false) != Phase::armed);
@@ -88,7 +88,7 @@ TEST_CASE("an arm that creeps by a count in two reports is not at rest; one that
     Phase phase = Phase::off;
     for (int i = 0; i < 300; ++i) {
       DeviceReport report = resting.arm.docked();
-      report.encoder[2] = static_cast<std::int16_t>(report.encoder[2] + (creeps ? i / 2 : i % 3));
+      report.counts[2] = static_cast<std::int16_t>(report.counts[2] + (creeps ? i / 2 : i % 3));
       phase = resting.servo->step(report).phase;
       if (creeps) REQUIRE(phase == Phase::calibrating);
     }
@@ -143,7 +143,7 @@ TEST_CASE("a later rest must be where the first was, within the play of a dock, 
         Rest rest = Rest::none;
         for (const int at : {first, later}) {
           DeviceReport report{.fresh = true, .parked = true};
-          report.encoder[joint] = static_cast<std::int16_t>(at);
+          report.counts[joint] = static_cast<std::int16_t>(at);
           for (std::uint32_t tick = 0; tick <= timing.rest_ticks; ++tick) {
             rest = follow_encoders(report, plan.device, timing, encoders);
           }

@@ -136,7 +136,7 @@ TEST_CASE("whatever noise the encoders have, the force changes by the slew or by
     double steepest_n = 0;
     for (int tick = 0; tick < 2000; ++tick) {
       auto report = armed.arm.at(0, kDeepMm, 0);
-      for (auto& count : report.encoder) {
+      for (auto& count : report.counts) {
         random = random * 1664525 + 1013904223;
         count = static_cast<std::int16_t>(count + static_cast<int>(random >> 16) % (2 * most + 1) -
                                           most);
@@ -213,7 +213,7 @@ TEST_CASE("a pose that is not finite: motors off after 2 ms, until the device wa
     plan.device.joints[0].angle_per_count = std::numeric_limits<double>::infinity();
     const auto state = std::make_unique<ServoState<N>>();
     DeviceReport report{.fresh = true, .parked = true, .homed = true};
-    report.encoder = {1, 1, 1};
+    report.counts = {1, 1, 1};
     const auto motors_on = [&] {
       static_cast<void>(sense(plan, *state, report));
       return state->supervisor.motors_on();
@@ -221,11 +221,11 @@ TEST_CASE("a pose that is not finite: motors off after 2 ms, until the device wa
     for (int tick = 0; tick <= rate_hz / 10; ++tick) motors_on();
     report.parked = false;
     for (int tick = 0; tick <= rate_hz / 10; ++tick) REQUIRE(motors_on());
-    report.encoder[0] = 0;
+    report.counts[0] = 0;
     int ticks_on = 0;
     while (motors_on() && ticks_on < rate_hz) ++ticks_on;
     CHECK(ticks_on == 2 * rate_hz / 1000);
-    report.encoder[0] = 1;
+    report.counts[0] = 1;
     CHECK_FALSE(motors_on());
     CHECK(state->supervisor.fault == Fault::not_finite);
   }
@@ -250,7 +250,7 @@ TEST_CASE("counters far beyond any joint leave a place in range, and docking for
     ArmedServo armed(scene);
     auto report = armed.arm.at(0, 5, 0);
     for (int i = 0; i < 100; ++i) {  // to a million counts, where the sines' series leaves floats
-      for (auto& encoder : report.encoder) encoder = static_cast<std::int16_t>(encoder + 10'000);
+      for (auto& encoder : report.counts) encoder = static_cast<std::int16_t>(encoder + 10'000);
       const ServoOutput out = armed.servo->step(report);
       CHECK(length(out.position_mm) < 10'000);
       CHECK_FALSE(out.motors_on);
@@ -312,8 +312,8 @@ TEST_CASE("whatever counters and pots read, the tool keeps its size and the forc
         // Some near the wall, some anywhere that 16 bits reach.
         if (tick % 8 == 0) report = armed.arm.at(0, 0.05, 0);
         const auto joint = static_cast<std::size_t>(next() % 3);
-        report.encoder[joint] = static_cast<std::int16_t>(
-            report.encoder[joint] + (tick % 8 < 4 ? next() % 64 - 32 : next()));
+        report.counts[joint] = static_cast<std::int16_t>(
+            report.counts[joint] + (tick % 8 < 4 ? next() % 64 - 32 : next()));
         report.wiper_a[joint] = static_cast<std::uint16_t>(next());
         report.wiper_b[joint] = static_cast<std::uint16_t>(next());
         const ServoOutput out = armed.servo->step(report);

@@ -96,7 +96,7 @@ TEST_CASE("a calibration moves the tip and is no velocity, in the first rest and
       int jumps = 0;
       std::array<double, 3> last_mm{};
       const auto step = [&](DeviceReport report) {
-        report.encoder[1] = static_cast<std::int16_t>(report.encoder[1] + off);
+        report.counts[1] = static_cast<std::int16_t>(report.counts[1] + off);
         const ServoOutput out = servo->step(report);
         jumps += std::abs(out.position_mm[1] - last_mm[1]) > 0.2 ? 1 : 0;
         last_mm = out.position_mm;

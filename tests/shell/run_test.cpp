@@ -365,7 +365,7 @@ struct FakeRoot : kerf::test::TemporaryFolder {
 };
 
 DeviceReport report(std::array<std::int16_t, 3> counts, bool parked, bool homed = true) {
-  return {.fresh = true, .encoder = counts, .parked = parked, .homed = homed};
+  return {.fresh = true, .counts = counts, .parked = parked, .homed = homed};
 }
 
 }  // namespace
