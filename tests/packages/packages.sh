@@ -54,7 +54,6 @@ grep -qE '^tick [0-9]+: tip -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ mm, force 0\.[0-9]*[1-
   fail "watch: $(cat "$home/watched")"
 [[ $("$home/segment-reader/build/watch" nobody 2>&1) == 'watch: --name nobody: '* ]] || fail 'watch: saw nobody'
 
-
 # A force of its own, by the header for C and by libkerf.
 for program in floor ball; do
   [[ $("$home/external/build/$program" nobody 2>&1) == "$program: "*'start kerf-controller'* ]] || fail "$program: saw nobody"
