@@ -16,6 +16,7 @@ struct Device::Parts {
   kerf_external external{};
   std::array<DeviceState, KERF_EXTERNAL_ARMS> states{};
   std::uint64_t refused = 0;
+  bool alive = true;
 };
 
 namespace {
@@ -56,23 +57,34 @@ double Device::period_s() const noexcept {
   return 1.0 / parts_->external.rate_hz;
 }
 
-bool Device::wait() noexcept {
+bool Device::poll() noexcept {
   kerf_external& external = parts_->external;
-  const std::int64_t quarter_ns = kNsPerSecond / 4 / external.rate_hz;
   std::array<kerf_report, KERF_EXTERNAL_ARMS> reports;
-  for (;; sleep_until_ns(monotonic_ns() + quarter_ns)) {
-    // The first arm first: the controller writes it after the others.
-    for (unsigned arm = 0; arm < external.arms; ++arm) {
-      if (kerf_external_read(&external, arm, &reports[arm]) == 0) return false;
-    }
-    if (reports[0].tick != parts_->states[0].tick) break;
+  // The first arm first: the controller writes it after the others.
+  for (unsigned arm = 0; arm < external.arms; ++arm) {
+    parts_->alive = kerf_external_read(&external, arm, &reports[arm]) != 0;
+    if (!parts_->alive) return false;
   }
+  if (reports[0].tick == parts_->states[0].tick) return false;
   parts_->refused = 0;
   for (unsigned arm = 0; arm < external.arms; ++arm) {
     parts_->states[arm] = state_of(reports[arm]);
     parts_->refused += reports[arm].refused;
   }
   return true;
+}
+
+bool Device::wait() noexcept {
+  const std::int64_t quarter_ns = kNsPerSecond / 4 / parts_->external.rate_hz;
+  while (!poll()) {
+    if (!parts_->alive) return false;
+    sleep_until_ns(monotonic_ns() + quarter_ns);
+  }
+  return true;
+}
+
+bool Device::alive() const noexcept {
+  return parts_->alive;
 }
 
 const DeviceState& Device::state(std::size_t arm) const noexcept {

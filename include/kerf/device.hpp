@@ -52,9 +52,15 @@ class Device {
   [[nodiscard]] double period_s() const noexcept;
 
   /// Waits for a tick that `state` does not have, and takes it, of all arms. Returns false if the
-  /// controller has ended; `state` keeps its last tick. It asks four times a period.
+  /// controller has ended; `state` keeps its last tick. It asks four times a period, for as long as
+  /// the controller lives.
   bool wait() noexcept;
-  /// The tick that `wait` took; for an arm that is none, one of zeros.
+  /// The same without waiting: takes the newest tick if `state` does not have it yet, and returns
+  /// whether it did.
+  bool poll() noexcept;
+  /// False once `wait` or `poll` has found that the controller has ended.
+  [[nodiscard]] bool alive() const noexcept;
+  /// The tick that was taken last; for an arm that is none, one of zeros.
   [[nodiscard]] const DeviceState& state(std::size_t arm = 0) const noexcept;
 
   /// What the arm gets from the next tick on; returns its number, which `answers` will reach, or 0
