@@ -46,7 +46,9 @@ Device Device::open(const std::string& name) {
   if (const char* problem = kerf_external_open(&parts->external, name.c_str())) {
     throw Error(problem);
   }
-  return Device(std::move(parts));
+  Device device(std::move(parts));
+  static_cast<void>(device.poll());
+  return device;
 }
 
 std::size_t Device::arms() const noexcept {
@@ -57,6 +59,10 @@ double Device::period_s() const noexcept {
   return 1.0 / parts_->external.rate_hz;
 }
 
+double Device::workspace_scale() const noexcept {
+  return parts_->external.workspace_scale;
+}
+
 bool Device::poll() noexcept {
   kerf_external& external = parts_->external;
   std::array<kerf_report, KERF_EXTERNAL_ARMS> reports;
@@ -65,13 +71,13 @@ bool Device::poll() noexcept {
     parts_->alive = kerf_external_read(&external, arm, &reports[arm]) != 0;
     if (!parts_->alive) return false;
   }
-  if (reports[0].tick == parts_->states[0].tick) return false;
+  const bool is_new = reports[0].tick != parts_->states[0].tick;
   parts_->refused = 0;
   for (unsigned arm = 0; arm < external.arms; ++arm) {
     parts_->states[arm] = state_of(reports[arm]);
     parts_->refused += reports[arm].refused;
   }
-  return true;
+  return is_new;
 }
 
 bool Device::wait() noexcept {

@@ -121,12 +121,15 @@ void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
   contact.device_mm_per_unit = Ratio(unit_mm / scene.device.workspace_scale);
 }
 
-/// The force of a program: it holds for the scene's time, rounded up to a tick.
+/// How long the force of a program counts, rounded up to a tick.
+[[nodiscard]] inline std::uint32_t stale_ticks(const LoadedScene& scene) {
+  return static_cast<std::uint32_t>(std::ceil(scene.force.stale_ms * scene.servo.rate_hz / 1000));
+}
+
 template <class N>
 [[nodiscard]] ExternalPlan<N> plan_external(const LoadedScene& scene) {
-  const double ticks = std::ceil(scene.force.stale_ms * scene.servo.rate_hz / 1000);
   return {.on = scene.force.model == ForceModel::external,
-          .stale_ticks = static_cast<std::uint32_t>(ticks),
+          .stale_ticks = stale_ticks(scene),
           .most_stiffness_n_per_mm = scene.force.stiffness_n_per_mm,
           .most_damping_ns_per_mm = scene.force.damping_ns_per_mm};
 }

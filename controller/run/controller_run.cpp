@@ -45,6 +45,7 @@
 #include "shared/posix/threads.hpp"
 #include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
+#include "shared/text/text.hpp"
 #include "shared/volume/material.hpp"
 #include "shared/wire/personality.hpp"
 
@@ -331,14 +332,20 @@ void explain_faults(const EventList& faults, const std::string& port, const std:
   }
 }
 
-/// Warns if a program gave none, or what is none.
-void tell_of_forces(const ExternalPage& external) {
-  if (external.given() == 0) {
+/// Warns if no force came, or came too late, or was refused.
+void tell_of_forces(const ExternalPage& external, double stale_ms) {
+  if (external.taken() == 0) {
     log_warning("no program gave a force: examples/external has one to begin with");
-  } else if (external.refused() > 0) {
-    log_warning(std::to_string(external.refused()) + " of " + std::to_string(external.given()) +
-                " forces of the program were refused: a number was not finite, or stiffness or "
-                "damping were above the scene's; give what docs/external.md allows");
+  }
+  if (external.refused() > 0) {
+    log_warning(std::to_string(external.refused()) + " of " + std::to_string(external.taken()) +
+                " forces of the program were refused: a number was not finite or out of bounds, or "
+                "stiffness or damping were below 0 or above the scene's; see docs/external.md");
+  }
+  if (external.gaps() > 1) {
+    log_warning("the program's force became stale " + std::to_string(external.gaps()) +
+                " times: a program ended, or its next one came after more than force.stale_ms = " +
+                number_text(stale_ms) + "; set that to two or three periods of the program");
   }
 }
 
@@ -410,7 +417,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
     name_law_faults(scene, faults, name);
     explain_faults(faults, start.port_texts[arm], name);
   }
-  if (start.external) tell_of_forces(*start.external);
+  if (start.external) tell_of_forces(*start.external, scene.force.stale_ms);
   report.removed_density_mm3 = removed_density_mm3(scene, report.record);
   const std::vector<double> removed = removed_mm3(scene, servo);
   report.removed_mm3 = std::accumulate(removed.begin(), removed.end(), 0.0);

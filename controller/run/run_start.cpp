@@ -18,6 +18,7 @@
 #include "controller/loop/wait_state.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/plan/gain_margin.hpp"
+#include "controller/plan/plan_contact.hpp"
 #include "controller/run/law_trial.hpp"
 #include "controller/run/scene_check.hpp"
 #include "controller/tool/tool_mesh.hpp"
@@ -205,7 +206,14 @@ RunStart::RunStart(const ControllerOptions& options, const std::atomic<bool>& st
       port_texts(ports_of(options, planned.scene)) {
   LoadedScene& scene = planned.scene;
   if (scene.force.model == ForceModel::external) {
-    external = std::make_unique<ExternalPage>(options.name, arms_of(scene), scene.servo.rate_hz);
+    if (options.virtual_time) {
+      log_warning(
+          "in lock-step ticks wait for no program, so that what it gives depends on the machine; "
+          "Servo::give_force of kerf/servo.hpp is in step");
+    }
+    external = std::make_unique<ExternalPage>(
+        options.name, ExternalPage::Run{arms_of(scene), scene.servo.rate_hz,
+                                        scene.device.workspace_scale, stale_ticks(scene)});
   }
   planned.servo->take(scene);
   try {

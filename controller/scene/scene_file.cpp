@@ -407,6 +407,11 @@ void read_lists(const SceneTables& tables, SceneParts& parts) {
 /// of reach, as in scenes/empty.toml, and a tip to be seen.
 void fill_in(SceneSpec& scene) {
   if (scene.force.model != ForceModel::external) return;
+  if (scene.volumes.empty() && scene.device.fit) {
+    refuse(scene.path,
+           ": device.fit fits the scene to its first [[volume]], and there is none; "
+           "leave it out");
+  }
   if (scene.volumes.empty()) {
     VolumeSpec& volume = scene.volumes.emplace_back();
     volume.where = scene.path;

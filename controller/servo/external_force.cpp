@@ -14,20 +14,28 @@ template <class N>
 bool give_force(const ServoPlan<N>& plan, const ProgramForce& given,
                 ExternalState<N>& state) noexcept {
   using Real = typename N::Real;
-  const auto within = [](double value, double most) { return value >= 0 && value <= most; };
-  const auto finite = [](double value) { return std::isfinite(value); };
-  if (!plan.external.on || !std::ranges::all_of(given.force_n, finite) ||
-      !std::ranges::all_of(given.goal_mm, finite) ||
-      !within(given.stiffness_n_per_mm, plan.external.most_stiffness_n_per_mm) ||
-      !within(given.damping_ns_per_mm, plan.external.most_damping_ns_per_mm)) {
+  const auto within = [](double value, double least, double most) {
+    return value >= least && value <= most;  // false for NaN
+  };
+  const auto all_within = [&](const std::array<double, 3>& of, double most) {
+    return std::ranges::all_of(of, [&](double value) { return within(value, -most, most); });
+  };
+  const bool has_goal = given.stiffness_n_per_mm != 0;
+  if (!plan.external.on || !all_within(given.force_n, kMostExternalN) ||
+      (has_goal && !all_within(given.goal_mm, kMostGoalMm)) ||
+      !within(given.stiffness_n_per_mm, 0, plan.external.most_stiffness_n_per_mm) ||
+      !within(given.damping_ns_per_mm, 0, plan.external.most_damping_ns_per_mm)) {
     return false;
   }
   const auto& [fx, fy, fz] = given.force_n;
-  const auto& [gx, gy, gz] = given.goal_mm;
   state.force_n = {Real(fx), Real(fy), Real(fz)};
-  const WorldVec<Real> goal_mm = WorldVec<Real>{Real(gx), Real(gy), Real(gz)} - plan.offset_mm;
-  state.goal_mm = {goal_mm.x / plan.workspace_scale, goal_mm.y / plan.workspace_scale,
-                   goal_mm.z / plan.workspace_scale};
+  state.goal_mm = {};
+  if (has_goal) {
+    const auto& [gx, gy, gz] = given.goal_mm;
+    const WorldVec<Real> goal_mm = WorldVec<Real>{Real(gx), Real(gy), Real(gz)} - plan.offset_mm;
+    state.goal_mm = {goal_mm.x / plan.workspace_scale, goal_mm.y / plan.workspace_scale,
+                     goal_mm.z / plan.workspace_scale};
+  }
   state.stiffness_n_per_mm = typename N::Ratio(given.stiffness_n_per_mm);
   state.damping_ns_per_mm = typename N::Unit(given.damping_ns_per_mm);
   state.age_ticks = 0;

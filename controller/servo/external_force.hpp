@@ -29,6 +29,7 @@ struct ExternalPlan {
 /// No component of a program's force is larger: below 2^8 N a `float` has all 16 fraction bits of
 /// the loop, so that the log has the force exactly.
 inline constexpr double kMostExternalN = 255;
+inline constexpr double kMostGoalMm = 10'000;  ///< of a goal, by axis, in the scene
 
 /// The last `ProgramForce` of an arm, and how much of it the hand gets.
 template <class N>
@@ -59,7 +60,8 @@ struct ExternalState {
 };
 
 /// Takes what a program asks for from the next tick on. Returns false, and changes nothing, for a
-/// number that is not finite, and for a stiffness or a damping below 0 or above the plan's.
+/// number that is not finite or beyond the two bounds above, and for a stiffness or a damping below
+/// 0 or above the plan's. Without a stiffness the goal is not looked at.
 template <class N>
 [[nodiscard]] bool give_force(const ServoPlan<N>& plan, const ProgramForce& given,
                               ExternalState<N>& state) noexcept;

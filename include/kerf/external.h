@@ -2,19 +2,21 @@
  *
  * A force of your own under kerf's limits, in C: the page of memory that a controller of a scene
  * with `force.model = "external"` shares with one program. You write what you ask for, kerf does
- * the rest: arming, fading, limits, watchdog, motors off (docs/external.md). Linux, GCC or Clang.
+ * the rest: arming, fading, limits, watchdog, motors off (docs/external.md). Linux, GCC or Clang,
+ * with -std=gnu99 or later, or -D_GNU_SOURCE.
  *
  *     kerf_external arm;
  *     kerf_report now;
  *     const char* problem = kerf_external_open(&arm, "kerf");
  *     while (!problem && kerf_external_read(&arm, 0, &now)) {
  *       kerf_force up = {.force_n = {0, 0.5, 0}};
- *       kerf_external_give(&arm, 0, &up);   // holds for force.stale_ms: 20 ms
+ *       kerf_external_give(&arm, 0, &up);   // counts for force.stale_ms: 20 ms
  *       usleep(2000);
  *     }
  *     kerf_external_close(&arm);
  *
- * Neither side ever waits for the other one. One program at a time, one thread of it an arm.
+ * Neither side ever waits for the other one. One program at a time, with at most one thread for
+ * each arm; a program that it has forked since shares its place.
  */
 #ifndef KERF_EXTERNAL_H
 #define KERF_EXTERNAL_H
@@ -30,30 +32,53 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#ifndef O_NOFOLLOW
+#error "kerf/external.h: compile with -std=gnu99 or later, or with -D_GNU_SOURCE"
+#endif
+
 #define KERF_EXTERNAL_MAGIC UINT64_C(0x316c6e747866726b) /* "krfxtnl1" */
 #define KERF_EXTERNAL_LAYOUT 1U
 #define KERF_EXTERNAL_BYTES 4096U
 #define KERF_EXTERNAL_ARMS 2U
 
-/* What a program asks for: force + stiffness (goal - tip) - damping v, at the device port, along
- * the axes of the scene. A number that is not finite, or a stiffness or damping beyond the scene's,
- * makes it no force: it is refused and counted, and the last one goes on. */
+/* What a program asks for: force + stiffness (goal - tip) / workspace_scale - damping v, at the
+ * device port, along the axes of the scene. Each component of the force at most 255 N, of a goal
+ * 10 m; stiffness and damping at most the scene's. Beyond that, or if a number is not finite, it is
+ * refused and counted, and the last one goes on. */
 typedef struct {
   double force_n[3];
   double goal_mm[3]; /* in the scene; counts with a stiffness alone */
   double stiffness_n_per_mm, damping_ns_per_mm;
 } kerf_force;
 
-/* The last tick of an arm. Phases, faults and flags are those of kerf/tick.hpp and docs/log.md. */
+/* Phases of the safety state machine; motors are on in RAMPING and ACTIVE. */
+enum {
+  KERF_PHASE_OFF,
+  KERF_PHASE_CALIBRATING,
+  KERF_PHASE_ARMED,
+  KERF_PHASE_RAMPING,
+  KERF_PHASE_ACTIVE,
+  KERF_PHASE_FAULT
+};
+/* Some of the flags; all of them, and the faults, are in docs/log.md. */
+enum {
+  KERF_FLAG_BUTTON1 = 1,
+  KERF_FLAG_BUTTON2 = 2,
+  KERF_FLAG_MOTORS_ON = 128,
+  KERF_FLAG_PARKED = 256
+};
+
+/* The last tick of an arm. */
 typedef struct {
-  uint64_t tick;         /* 0: none yet */
-  uint64_t answers;      /* number of the newest force that the tick had: 1 for the first given */
-  uint64_t refused;      /* forces that were none, since the controller's start */
-  double position_mm[3]; /* of the tip, in the scene; NaN until the device is calibrated */
-  double orientation[4]; /* quaternion x, y, z, w; NaN likewise */
-  double velocity_mm_per_s[3]; /* at the device port; NaN until the device was in hand */
+  uint64_t tick;    /* 0: none yet */
+  uint64_t answers; /* number of the newest force that came before the tick, a refused one too */
+  uint64_t refused; /* forces that were refused, since the controller's start */
+  double position_mm[3];       /* of the tip, in the scene; NaN until the device is calibrated */
+  double orientation[4];       /* quaternion x, y, z, w; NaN as the position */
+  double velocity_mm_per_s[3]; /* at the device port; NaN until the device is first in hand */
   double force_n[3];           /* sent to the device, after all limits */
-  uint32_t phase, fault, flags, reserved;
+  uint32_t phase, fault, flags;
+  uint32_t gaps; /* times that a force became stale, since the controller's start */
 } kerf_report;
 
 /* One arm's part of the page. A version is odd while the rest of its part is written. */
@@ -72,8 +97,9 @@ typedef struct {
 typedef struct {
   uint64_t magic;
   uint32_t layout, arms, rate_hz, reserved;
-  uint64_t session; /* 0: the controller is not ready, or has ended */
-  uint8_t room[256 - 4 * sizeof(uint64_t)];
+  uint64_t session;       /* 0: the controller is not ready, or has ended */
+  double workspace_scale; /* mm of the scene for each mm of the device */
+  uint8_t room[256 - 5 * sizeof(uint64_t)];
   kerf_external_arm arm[KERF_EXTERNAL_ARMS];
   uint8_t more_room[KERF_EXTERNAL_BYTES - 256 - KERF_EXTERNAL_ARMS * sizeof(kerf_external_arm)];
 } kerf_external_page;
@@ -83,6 +109,7 @@ typedef struct {
   kerf_external_page* page; /* null: not open */
   int file;
   uint32_t arms, rate_hz;
+  double workspace_scale;
   uint64_t session;
   uint64_t last_tick[KERF_EXTERNAL_ARMS]; /* that was read */
 } kerf_external;
@@ -116,9 +143,9 @@ static inline void kerf_external_store(void* page, const void* own, size_t bytes
 }
 
 /* Opens the page of the controller that runs under `name` (its --name; "kerf" if it has none).
- * Returns null, or why not: one line that lives as long as the program. */
+ * Returns null, or why not: one line, until the next call in this thread. */
 static inline const char* kerf_external_open(kerf_external* out, const char* name) {
-  static __thread char why[512];
+  static __thread char why[1024];
   char path[400];
   const char* const runtime = getenv("XDG_RUNTIME_DIR");
   struct stat status;
@@ -134,10 +161,10 @@ static inline const char* kerf_external_open(kerf_external* out, const char* nam
   }
   out->file = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
   if (out->file < 0) {
-    snprintf(
-        why, sizeof why,
-        "%s: %s; start kerf-controller with a scene of force.model = \"external\" and --name %s",
-        path, strerror(errno), name);
+    snprintf(why, sizeof why,
+             "%s: %s; no controller with a scene of force.model = \"external\" runs here as --name "
+             "%s; start one, with your user and XDG_RUNTIME_DIR",
+             path, strerror(errno), name);
     return why;
   }
   if (fstat(out->file, &status) != 0 || status.st_size < (off_t)KERF_EXTERNAL_BYTES) {
@@ -145,7 +172,9 @@ static inline const char* kerf_external_open(kerf_external* out, const char* nam
   } else if (!kerf_external_lives(out->file)) {
     snprintf(why, sizeof why, "%s: its controller has ended; start it again", path);
   } else if (flock(out->file, LOCK_EX | LOCK_NB) != 0) {
-    snprintf(why, sizeof why, "%s: another program gives the force; end that one first", path);
+    snprintf(why, sizeof why,
+             "%s: a program has it: another one, this one, or a fork of either; end that first",
+             path);
   } else {
     void* const mapped =
         mmap(NULL, KERF_EXTERNAL_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, out->file, 0);
@@ -156,13 +185,15 @@ static inline const char* kerf_external_open(kerf_external* out, const char* nam
     out->session = __atomic_load_n(&out->page->session, __ATOMIC_ACQUIRE);
     out->arms = out->page->arms;
     out->rate_hz = out->page->rate_hz;
+    out->workspace_scale = out->page->workspace_scale;
     if (out->page->magic == KERF_EXTERNAL_MAGIC && out->page->layout == KERF_EXTERNAL_LAYOUT &&
         out->arms >= 1 && out->arms <= KERF_EXTERNAL_ARMS && out->session != 0) {
       return NULL;
     }
     snprintf(why, sizeof why,
-             "%s: no page of layout %u, or not ready; compile with the header of this kerf", path,
-             KERF_EXTERNAL_LAYOUT);
+             "%s: no page of layout %u, or not ready; compile with the header of that kerf, or "
+             "start the controller again",
+             path, KERF_EXTERNAL_LAYOUT);
     munmap(out->page, KERF_EXTERNAL_BYTES);
     out->page = NULL;
   }
@@ -171,7 +202,8 @@ static inline const char* kerf_external_open(kerf_external* out, const char* nam
   return why;
 }
 
-/* Ends it: the force that was given last fades within force.stale_ms and 15 ms. Twice is once. */
+/* Gives the device back: the last force counts for force.stale_ms, then fades in 15 ms. A second
+ * call does nothing. */
 static inline void kerf_external_close(kerf_external* external) {
   if (external->page != NULL) munmap(external->page, KERF_EXTERNAL_BYTES);
   if (external->file >= 0) close(external->file);
@@ -179,9 +211,10 @@ static inline void kerf_external_close(kerf_external* external) {
   external->file = -1;
 }
 
-/* The newest tick of an arm, 0 or 1; tick 0, of the phase off, before the first one. Returns 0, and
- * leaves `out`, if the controller has ended or was killed, and for an arm that it lacks. No system
- * call, unless the tick is the one that was read last. */
+/* The newest tick of an arm, 0 or 1; tick 0, in the phase off, before the first one. Returns 0, and
+ * does not change `out`, if the controller has ended, and for an arm that it lacks. Of a controller
+ * that was killed the last tick can be read once more. It makes no system call, unless the tick is
+ * the one that was read last. */
 static inline int kerf_external_read(kerf_external* external, unsigned arm, kerf_report* out) {
   kerf_external_arm* part;
   unsigned tries;
@@ -206,7 +239,8 @@ static inline int kerf_external_read(kerf_external* external, unsigned arm, kerf
 }
 
 /* Asks for a force, from the controller's next tick on. Returns its number, which `answers` of a
- * report will reach; 0 if it is not open, or for an arm that it lacks. */
+ * report will reach; numbers go on from the last program's. Returns 0 if the page is not open, and
+ * for an arm that the controller lacks. It does not notice an end: kerf_external_read does. */
 static inline uint64_t kerf_external_give(kerf_external* external, unsigned arm,
                                           const kerf_force* force) {
   kerf_external_arm* part;

@@ -62,14 +62,15 @@ struct ServoCommand {
 };
 
 /// What a program asks of the hand in a scene with `force.model = "external"`: force plus
-/// stiffness (goal - tip) - damping v, at the device port, along its axes. All limits of the scene
-/// apply to it. It holds for `force.stale_ms`; without a new one it fades to zero, and fades in
-/// again with the next (docs/external.md).
+/// stiffness (goal - tip) / workspace_scale - damping v, at the device port, along the axes of the
+/// scene. All limits of the scene apply to it. It counts for `force.stale_ms`; without a new one it
+/// fades to zero, and fades in again with the next (docs/external.md). One that is not finite or
+/// beyond the bounds below is refused.
 struct ProgramForce {
   std::array<double, 3> force_n{};  ///< each component at most 255 N
-  std::array<double, 3> goal_mm{};  ///< in the scene; counts with a stiffness alone
-  double stiffness_n_per_mm = 0;    ///< 0 to the scene's `force.stiffness_n_per_mm`
-  double damping_ns_per_mm = 0;     ///< 0 to the scene's `force.damping_ns_per_mm`
+  std::array<double, 3> goal_mm{};  ///< in the scene, at most 10 m; counts with a stiffness alone
+  double stiffness_n_per_mm = 0;    ///< at the device; up to the scene's `force.stiffness_n_per_mm`
+  double damping_ns_per_mm = 0;     ///< at the device; up to the scene's `force.damping_ns_per_mm`
 };
 
 /// Phase of the safety state machine. Motors are on in `ramping` and `active` only. Values go

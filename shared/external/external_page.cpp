@@ -2,6 +2,7 @@
 #include "shared/external/external_page.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <iterator>
 #include <limits>
@@ -21,6 +22,10 @@ namespace {
 static_assert(sizeof(kerf_external_page) == KERF_EXTERNAL_BYTES);
 static_assert(sizeof(kerf_report) % 8 == 0 && sizeof(kerf_force) == 64);
 static_assert(KERF_EXTERNAL_ARMS == kMaxArms);
+static_assert(KERF_PHASE_ACTIVE == static_cast<int>(Phase::active) &&
+              KERF_PHASE_FAULT == static_cast<int>(Phase::fault));
+static_assert(KERF_FLAG_BUTTON1 == kFlagButton1 && KERF_FLAG_BUTTON2 == kFlagButton2 &&
+              KERF_FLAG_MOTORS_ON == kFlagMotorsOn && KERF_FLAG_PARKED == kFlagParked);
 
 SegmentError failure(const std::string& path) {
   const int error = errno;
@@ -35,8 +40,9 @@ std::size_t part_of(std::size_t arm) noexcept {
 
 }  // namespace
 
-ExternalPage::ExternalPage(std::string_view name, std::size_t arms, int rate_hz)
-    : path_(segment_folder() + "/external-" + std::string(name) + ".page") {
+ExternalPage::ExternalPage(std::string_view name, const Run& run)
+    : path_(segment_folder() + "/external-" + std::string(name) + ".page"),
+      stale_ticks_(run.stale_ticks) {
   unlink(path_.c_str());  // of a run that was killed
   file_ = OwnedFd(open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
   if (file_.get() < 0) throw failure(path_);
@@ -60,14 +66,16 @@ ExternalPage::ExternalPage(std::string_view name, std::size_t arms, int rate_hz)
   word(at(offsetof(kerf_external_page, magic)))
       .store(KERF_EXTERNAL_MAGIC, std::memory_order_relaxed);
   put(offsetof(kerf_external_page, layout), KERF_EXTERNAL_LAYOUT);
-  put(offsetof(kerf_external_page, arms), static_cast<std::uint32_t>(arms));
-  put(offsetof(kerf_external_page, rate_hz), static_cast<std::uint32_t>(rate_hz));
+  put(offsetof(kerf_external_page, arms), static_cast<std::uint32_t>(run.arms));
+  put(offsetof(kerf_external_page, rate_hz), static_cast<std::uint32_t>(run.rate_hz));
+  word(at(offsetof(kerf_external_page, workspace_scale)))
+      .store(std::bit_cast<std::uint64_t>(run.workspace_scale), std::memory_order_relaxed);
   TickRecord none{};
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   std::ranges::fill(none.position_mm, kNan);
   std::ranges::fill(none.orientation, static_cast<float>(kNan));
   std::ranges::fill(none.velocity_mm_per_s, static_cast<float>(kNan));
-  for (std::size_t arm = 0; arm < arms; ++arm) publish(arm, none);
+  for (std::size_t arm = 0; arm < run.arms; ++arm) publish(arm, none);
   word(at(offsetof(kerf_external_page, session)))
       .store(random_session_id(), std::memory_order_release);
 }
@@ -79,6 +87,9 @@ ExternalPage::~ExternalPage() {
 }
 
 bool ExternalPage::take(std::size_t arm, ProgramForce& force) noexcept {
+  ArmCounts& counts = arms_[arm];
+  const bool was_given = counts.taken > 0 && counts.age_ticks < stale_ticks_;
+  if (was_given && ++counts.age_ticks == stale_ticks_) ++counts.gaps;
   std::byte* const part = at(part_of(arm));
   std::byte* const version = part + offsetof(kerf_external_arm, force_version);
   const std::uint64_t seen = shared_words::word(version).load(std::memory_order_acquire);
@@ -88,9 +99,10 @@ bool ExternalPage::take(std::size_t arm, ProgramForce& force) noexcept {
     kerf_force force;
   } read;
   shared_words::load(&read, part + offsetof(kerf_external_arm, force_number), sizeof read);
-  if (!shared_words::unchanged(version, seen) || read.number == arms_[arm].number) return false;
-  arms_[arm].number = read.number;
-  ++arms_[arm].given;
+  if (!shared_words::unchanged(version, seen) || read.number == counts.number) return false;
+  counts.number = read.number;
+  counts.age_ticks = 0;
+  ++counts.taken;
   force = {.stiffness_n_per_mm = read.force.stiffness_n_per_mm,
            .damping_ns_per_mm = read.force.damping_ns_per_mm};
   std::ranges::copy(read.force.force_n, force.force_n.begin());
@@ -110,6 +122,7 @@ void ExternalPage::publish(std::size_t arm, const TickRecord& record) noexcept {
   report.phase = record.phase;
   report.fault = record.fault;
   report.flags = record.flags;
+  report.gaps = arms_[arm].gaps;
   std::byte* const part = at(part_of(arm));
   std::byte* const version = part + offsetof(kerf_external_arm, report_version);
   const std::uint64_t even = 2 * arms_[arm].published++;

@@ -17,12 +17,19 @@
 namespace kerf {
 
 /// The page of a run. The file is made anew at the start, and unlinked at the end; after a kill it
-/// stays, without the lock that says that its controller lives, until the next run of its name.
+/// stays, without the lock that says that its controller lives, until the next run of its name. Who
+/// truncates it while it is mapped ends the run (SIGBUS, as of any mapped file; the motors go off).
 class ExternalPage {
  public:
   /// Under the name of the segment, whose lock the caller holds. Throws SegmentError with one line
   /// if there can be no file.
-  ExternalPage(std::string_view name, std::size_t arms, int rate_hz);
+  struct Run {
+    std::size_t arms = 1;
+    int rate_hz = 1000;
+    double workspace_scale = 1;
+    std::uint32_t stale_ticks = 20;  ///< of the scene
+  };
+  ExternalPage(std::string_view name, const Run& run);
   ~ExternalPage();
   ExternalPage(const ExternalPage&) = delete;
   ExternalPage& operator=(const ExternalPage&) = delete;
@@ -38,15 +45,21 @@ class ExternalPage {
   void publish(std::size_t arm, const TickRecord& record) noexcept;
 
   /// Of both arms, since the start.
-  [[nodiscard]] std::uint64_t given() const noexcept { return arms_[0].given + arms_[1].given; }
+  [[nodiscard]] std::uint64_t taken() const noexcept { return arms_[0].taken + arms_[1].taken; }
   [[nodiscard]] std::uint64_t refused() const noexcept {
     return arms_[0].refused + arms_[1].refused;
+  }
+  /// Times that a force became stale.
+  [[nodiscard]] std::uint64_t gaps() const noexcept {
+    return std::uint64_t{arms_[0].gaps} + arms_[1].gaps;
   }
 
  private:
   struct ArmCounts {
     std::uint64_t number = 0;  ///< of the force that was taken last
-    std::uint64_t given = 0, refused = 0;
+    std::uint64_t taken = 0, refused = 0;
+    std::uint32_t age_ticks = 0;  ///< since one was taken, up to stale_ticks
+    std::uint32_t gaps = 0;       ///< times that it became stale
     std::uint64_t published = 0;
   };
 
@@ -55,6 +68,7 @@ class ExternalPage {
   std::string path_;
   OwnedFd file_;
   std::byte* bytes_ = nullptr;
+  std::uint32_t stale_ticks_;
   std::array<ArmCounts, kMaxArms> arms_;
 };
 

@@ -77,11 +77,15 @@ std::string problem_of(const std::string& name) {
 
 TEST_CASE("a program reads ticks and gives forces") {
   const Folder folder;
-  kerf::ExternalPage page("kerf", 2, 1000);
+  kerf::ExternalPage page("kerf", {.arms = 2, .workspace_scale = 0.5, .stale_ticks = 3});
   auto device = kerf::Device::open();
   CHECK(device.arms() == 2);
   CHECK(device.period_s() == doctest::Approx(0.001));
+  CHECK(device.workspace_scale() == 0.5);
   CHECK(device.state().tick == 0);
+  CHECK(std::isnan(device.state().position_mm[0]));
+  CHECK_FALSE(device.poll());
+  CHECK(device.alive());
   kerf::ProgramForce force;
   CHECK_FALSE(page.take(0, force));
   page.publish(1, record_of(7));
@@ -112,17 +116,29 @@ TEST_CASE("a program reads ticks and gives forces") {
   CHECK(device.state().answers == 2);
   CHECK(device.state(1).answers == 1);
   CHECK(device.refused() == 1);
-  CHECK(page.given() == 2);
+  CHECK(page.taken() == 2);
   CHECK(page.refused() == 1);
+
+  // Without a new one for three ticks there is a gap, once.
+  CHECK(page.gaps() == 0);
+  for (int i = 0; i < 3; ++i) CHECK_FALSE(page.take(1, force));
+  CHECK(page.gaps() == 1);
+  for (int i = 0; i < 9; ++i) CHECK_FALSE(page.take(1, force));
+  CHECK(page.gaps() == 1);
+  device.give({}, 1);
+  CHECK(page.take(1, force));
+  for (int i = 0; i < 3; ++i) CHECK_FALSE(page.take(1, force));
+  CHECK(page.gaps() == 2);
 }
 
 TEST_CASE("one program at a time, and the next one goes on") {
   const Folder folder;
-  kerf::ExternalPage page("a", 1, 4000);
+  kerf::ExternalPage page("a", {.rate_hz = 4000});
   std::optional<kerf::Device> first(kerf::Device::open("a"));
   CHECK(first->give({}) == 1);
   CHECK(problem_of("a") ==
-        folder.page("a").string() + ": another program gives the force; end that one first");
+        folder.page("a").string() +
+            ": a program has it: another one, this one, or a fork of either; end that first");
   first.reset();
   auto second = kerf::Device::open("a");
   CHECK(second.give({}) == 2);
@@ -131,22 +147,26 @@ TEST_CASE("one program at a time, and the next one goes on") {
 TEST_CASE("no controller, one that has ended, one that was killed, a page of another kind") {
   const Folder folder;
   CHECK(problem_of("none").starts_with(folder.page("none").string() + ": No such file"));
+  CHECK(problem_of("none").find("with your user and XDG_RUNTIME_DIR") != std::string::npos);
   CHECK(problem_of("../../etc/x") == "name: not that of a controller; use its --name");
   std::optional<kerf::Device> device;
   {
-    kerf::ExternalPage page("b", 1, 1000);
+    kerf::ExternalPage page("b", {});
     page.publish(0, record_of(1));
     device = kerf::Device::open("b");
+    CHECK(device->state().tick == 1);
+    page.publish(0, record_of(2));
     CHECK(device->wait());
   }
   CHECK_FALSE(device->wait());
-  CHECK(device->state().tick == 1);
+  CHECK_FALSE(device->alive());
+  CHECK(device->state().tick == 2);
   device.reset();
   CHECK_FALSE(std::filesystem::exists(folder.page("b")));
 
   const pid_t child = fork();
   if (child == 0) {
-    kerf::ExternalPage page("c", 1, 1000);
+    kerf::ExternalPage page("c", {});
     page.publish(0, record_of(5));
     kill(getpid(), SIGKILL);
   }
@@ -155,7 +175,7 @@ TEST_CASE("no controller, one that has ended, one that was killed, a page of ano
   CHECK(problem_of("c") ==
         folder.page("c").string() + ": its controller has ended; start it again");
   {
-    const kerf::ExternalPage page("c", 1, 1000);
+    const kerf::ExternalPage page("c", {});
     CHECK(problem_of("c").empty());
     const auto at = [&](std::size_t offset, std::uint32_t value) {
       std::fstream file(folder.page("c"), std::ios::in | std::ios::out | std::ios::binary);
@@ -174,7 +194,7 @@ TEST_CASE("no controller, one that has ended, one that was killed, a page of ano
 
 TEST_CASE("neither side sees half of what the other one writes") {
   const Folder folder;
-  kerf::ExternalPage page("d", 1, 1000);
+  kerf::ExternalPage page("d", {});
   std::atomic<bool> stop{false};
   std::jthread program([&] {
     auto device = kerf::Device::open("d");

@@ -37,7 +37,7 @@ class Program {
         give(servo, 1, 5, 0.4, 0.002);
         return;
       case 2:  // floods
-        for (int i = 0; i < 20; ++i) give(servo, 1e30, 1e30, 0.4, 0.002);
+        for (int i = 0; i < 20; ++i) give(servo, i % 2 == 0 ? 255 : 1e30, 1e4, 0.4, 0.002);
         return;
       case 3:  // no numbers
         give(servo, std::numeric_limits<double>::quiet_NaN(), 1, 0, 0);

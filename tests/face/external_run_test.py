@@ -158,7 +158,7 @@ class TestExternal(unittest.TestCase):
         controller = self.controller()
         first = self.start(self.push)
         self.until_felt(first)
-        self.assertIn("another program gives the force", self.start(self.push).communicate(timeout=60)[0])
+        self.assertIn("a program has it", self.start(self.push).communicate(timeout=60)[0])
         controller.kill()
         out = first.communicate(timeout=60)[0]
         self.assertEqual(first.returncode, 0, out)  # it was told that the controller has ended

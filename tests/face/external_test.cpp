@@ -148,6 +148,7 @@ TEST_CASE("a scene for a program needs nothing else, and refuses what contact al
   CHECK(problem("friction = 0.1\n").find("force.friction") != std::string::npos);
   CHECK(problem("[cut]\nmodel = \"preston\"\n").find("leave it out") != std::string::npos);
   CHECK(problem("stale_ms = 0\n").find("force.stale_ms") != std::string::npos);
+  CHECK(problem("[device]\nfit = true\n").find("there is none") != std::string::npos);
   CHECK(problem("[[volume]]\nfile = \"phantom\"\n") == "");
   CHECK(problem("[[tool]]\nshape = \"ball\"\nradius_mm = 3\n") == "");
 }
@@ -168,7 +169,7 @@ TEST_CASE("the limits of the scene hold for a program too") {
   float last_n = 0, most_n = 0;
   for (int i = 0; i < 2000; ++i) {
     const double sign = i / 100 % 2 == 0 ? 1 : -1;
-    const auto& tick = loop.pushed({.force_n = {0, sign * 1e30, 0}}, 1);
+    const auto& tick = loop.pushed({.force_n = {0, sign * 255, 0}}, 1);
     const float now_n = tick.commanded_force_n[1];
     CHECK(std::abs(tick.contact_force_n[1]) <= 255);
     CHECK(std::abs(now_n) <= 2.0F);
@@ -187,7 +188,9 @@ TEST_CASE("what is no force is refused, and the last one holds") {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
   CHECK_FALSE(loop.servo.give_force({.force_n = {0, kNan, 0}}));
-  CHECK_FALSE(loop.servo.give_force({.goal_mm = {kInfinite, 0, 0}}));
+  CHECK_FALSE(loop.servo.give_force({.goal_mm = {kInfinite, 0, 0}, .stiffness_n_per_mm = 0.1}));
+  CHECK_FALSE(loop.servo.give_force({.goal_mm = {0, 1e307, 0}, .stiffness_n_per_mm = 0.1}));
+  CHECK_FALSE(loop.servo.give_force({.force_n = {0, 256, 0}}));
   CHECK_FALSE(loop.servo.give_force({.stiffness_n_per_mm = 0.41}));
   CHECK_FALSE(loop.servo.give_force({.stiffness_n_per_mm = -0.1}));
   CHECK_FALSE(loop.servo.give_force({.stiffness_n_per_mm = kNan}));
@@ -196,6 +199,18 @@ TEST_CASE("what is no force is refused, and the last one holds") {
   CHECK(loop.step().contact_force_n[1] == 0.5F);
   kerf::Servo other(kerf::Scene::load(kScenes + "/touch.toml"));
   CHECK_FALSE(other.give_force(kUp));
+}
+
+TEST_CASE("without a stiffness a goal is not looked at, whatever it is and whatever the scale") {
+  for (const char* numbers : {"fixed", "double"}) {
+    CAPTURE(std::string(numbers));
+    Loop loop(
+        external({std::string("servo.numeric=\"") + numbers + "\"", "device.workspace_scale=0.1"}));
+    kerf::ProgramForce force = kUp;
+    force.goal_mm = {1e307, -std::numeric_limits<double>::infinity(), 0};
+    CHECK(loop.pushed(force, 100).contact_force_n[1] == 0.5F);
+    CHECK(loop.servo.last().fault == 0);
+  }
 }
 
 TEST_CASE("a run with a program's force is replayed from its log alone") {
