@@ -138,7 +138,7 @@ endforeach()
 configure_package_config_file(cmake/kerf-config.cmake.in ${PROJECT_BINARY_DIR}/kerf-config.cmake
   INSTALL_DESTINATION ${package} PATH_VARS CMAKE_INSTALL_DATADIR CMAKE_INSTALL_BINDIR)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/kerf-config-version.cmake
-  COMPATIBILITY SameMinorVersion)
+  COMPATIBILITY SameMajorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/kerf-config.cmake ${PROJECT_BINARY_DIR}/kerf-config-version.cmake
   DESTINATION ${package})
 include(cmake/package.cmake)

@@ -11,14 +11,14 @@ kerf.Error with one line; Ctrl-C in a run raises kerf.Interrupted, which has wha
 from kerf_reader import Segment, SegmentError
 from kerf_reader.tick import TICK
 
-from ._kerf import (Error, LawInput, ReplayDifference, SampledHand, SampledLoop, State, Verdict, __version__, device_loop, highest_damping,
-                    highest_stiffness, is_stable, passive_stiffness, passive_viscosity, quantum_stiffness)
+from ._kerf import (Device, DeviceState, Error, LawInput, Phase, ReplayDifference, SampledHand, SampledLoop, State, Verdict, __version__,
+                    device_loop, highest_damping, highest_stiffness, is_stable, passive_stiffness, passive_viscosity, quantum_stiffness)
 from .interrupted import Interrupted
 from .log import Log, Replay, replay
 from .loop import Loop
 from .scene import Scene
 from .stability import Cell, Map, cell, zwidth
 
-__all__ = ["Cell", "Error", "Interrupted", "LawInput", "Log", "Loop", "Map", "Replay", "ReplayDifference", "SampledHand", "SampledLoop", "Scene",
-           "Segment", "SegmentError", "State", "TICK", "Verdict", "__version__", "cell", "device_loop", "highest_damping", "highest_stiffness",
-           "is_stable", "passive_stiffness", "passive_viscosity", "quantum_stiffness", "replay", "zwidth"]
+__all__ = ["Cell", "Device", "DeviceState", "Error", "Interrupted", "LawInput", "Log", "Loop", "Map", "Phase", "Replay", "ReplayDifference",
+           "SampledHand", "SampledLoop", "Scene", "Segment", "SegmentError", "State", "TICK", "Verdict", "__version__", "cell", "device_loop",
+           "highest_damping", "highest_stiffness", "is_stable", "passive_stiffness", "passive_viscosity", "quantum_stiffness", "replay", "zwidth"]

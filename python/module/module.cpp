@@ -67,6 +67,7 @@ PYBIND11_MODULE(_kerf, module) {
   });
   define_scene(module);
   define_law(module);
+  define_device(module);
   define_loop(module);
   define_log(module);
   define_stability(module);

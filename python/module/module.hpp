@@ -24,6 +24,7 @@ void handle_signals();
 
 void define_scene(pybind11::module_& module);
 void define_law(pybind11::module_& module);
+void define_device(pybind11::module_& module);
 void define_loop(pybind11::module_& module);
 void define_log(pybind11::module_& module);
 void define_stability(pybind11::module_& module);

@@ -62,9 +62,9 @@ TEST_CASE("before there is a device, what is waited for is the port that does no
     CHECK(stopped(run) == waits + "socket:" + run.socket(1));
   }
   {
-    TwoArms run;  // each adapter by the name of its own device
+    TwoArms run;  // a kerf-arm with a name is waited for, and not started
     run.write_scene({"omega", "touch"});
-    run.control({}, {"arm", "arm"});
-    CHECK(stopped(run) == waits + "arm:omega");
+    run.control({}, {"arm:left", "arm:right"});
+    CHECK(stopped(run) == waits + "arm:left");
   }
 }
