@@ -122,7 +122,7 @@ void define_device(py::module_& module) {
           "v. It holds for force.stale_ms.\n"
           "Returns its number, which `answers` of a state will reach.")
       .def("close", &OpenDevice::close,
-           "Gives the device back: the last force fades out. Twice is once.")
+           "Gives the device back: the last force fades out. A second call does nothing.")
       .def("__enter__", [](py::object self) { return self; })
       .def("__exit__", [](OpenDevice& self, const py::args&) { self.close(); })
       .def("__iter__", [](py::object self) { return self; })

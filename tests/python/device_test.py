@@ -47,9 +47,9 @@ class TestDevice(unittest.TestCase):
                 self.assertGreater(state.tick, last)
                 last = state.tick
                 number = device.give(force_n=(0, 0.5, 0))
-                if state.force_n[1] > 0.49:
+                if state.force_n[1] > 0.49 and state.phase == kerf.Phase.ACTIVE:
                     break
-            self.assertEqual((state.phase, state.fault), (kerf.Phase.ACTIVE, "none"))
+            self.assertEqual(state.fault, "none")
             self.assertGreater(number, 1)
             self.assertFalse(any(map(math.isnan, state.position_mm)))
             device.give(force_n=(math.nan, 0, 0))
