@@ -70,7 +70,7 @@ awk 'BEGIN { print "#define KERF_VERSION \"\"" } NF { print "#include <" $1 ">" 
 $compiler -fpch-instantiate-templates -x c++-header "$work/standard.hpp" -o "$work/standard.pch"
 # Not compiled: parts of a kernel, whose including file says first which vectors they mean, and what
 # tests share, which CMake gives names of folders.
-parts='^tests/|^controller/kernel/sets/(.*_(vector|loops)|set_table)\.hpp$|^visualizer/cast/simd/packet_'
+parts='^tests/|^controller/kernel/sets/(.*_(vector|loops)|set_table)\.hpp$|^visualizer/cast/simd/packet_|^visualizer/scene/simd/filter_rows\.hpp$'
 # Lines of headers, each of which includes all that stand before it and all that these include: what it sees there, it
 # would see alone. So one file shows all of a line.
 in_chains() {

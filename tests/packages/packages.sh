@@ -56,7 +56,7 @@ grep -qE '^tick [0-9]+: tip -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ mm, force 0\.[0-9]*[1-
 
 # A force of its own, by the header for C and by libkerf.
 for program in floor ball; do
-  [[ $("$home/external/build/$program" nobody 2>&1) == "$program: "*'start kerf-controller'* ]] || fail "$program: saw nobody"
+  [[ $("$home/external/build/$program" nobody 2>&1) == "$program: "*'no controller with a scene'* ]] || fail "$program: saw nobody"
 done
 
 [[ $(kerf --version) == "kerf "[0-9]* ]] || fail "kerf --version: $(kerf --version)"
