@@ -256,6 +256,12 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   const RecordedScene recorded = read_scene(folder);
   const SceneSource source = changed(recorded.source, changes);
   run.scene = load_scene(source, recorded_inputs(folder, recorded.inputs, changes));
+  // Inputs before the log are `TickInputs`, which have no force of a program.
+  if (run.scene.force.model == ForceModel::external && run.earlier_ticks() > 0) {
+    throw RecordError(folder.string() + ": of the first " + ticks_text(run.earlier_ticks()) +
+                      " the force of the program is not in it; record the run whole, with a "
+                      "recorder without --flight that starts before the controller");
+  }
   Json json = scene_json(run.scene);
   run.canonical = json.canonical();
   run.scene_json = json_with_source(std::move(json), run.scene, source);

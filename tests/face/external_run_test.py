@@ -5,6 +5,7 @@ and faded as docs/external.md says, whatever becomes of the program, and the log
     external_run_test.py ROOT BIN CC"""
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -109,12 +110,19 @@ class TestExternal(unittest.TestCase):
                 return
         self.fail("the force was never felt")
 
-    def recorded(self):
-        recorder = self.start(BIN / "kerf-recorder", "--name", "external-run", "--out", self.folder / "log")
+    def recorded(self, *words):
+        recorder = self.start(BIN / "kerf-recorder", "--name", "external-run", "--out", self.folder / "log", *words)
+        if words:
+            return recorder
         while not (self.folder / "log/ticks.npy").exists():
             self.assertIsNone(recorder.poll())
             time.sleep(0.01)
         return recorder
+
+    @staticmethod
+    def catches(program, number):
+        caught = re.search(r"SigCgt:\s*(\w+)", pathlib.Path(f"/proc/{program.pid}/status").read_text())[1]
+        return int(caught, 16) >> number - 1 & 1 == 1
 
     def ended(self, program, expected=0):
         program.send_signal(signal.SIGINT)
@@ -145,6 +153,26 @@ class TestExternal(unittest.TestCase):
                 self.assertFalse(log["fault"].any())
                 self.assertIn("equal", text(BIN / "kerf-replay", self.folder / "log"))
                 shutil.rmtree(self.folder / "log")
+
+    def test_a_flight_recording_lacks_the_forces_before_it_and_its_replay_is_refused(self):
+        controller, recorder = self.controller(), self.recorded("--flight", "1")
+        program = self.start(self.push)
+        self.until_felt(program)
+        while not self.catches(recorder, signal.SIGUSR1):
+            self.assertIsNone(recorder.poll())
+            time.sleep(0.01)
+        time.sleep(1.5)  # more than the recorder keeps
+        recorder.send_signal(signal.SIGUSR1)
+        while not list((self.folder / "log").glob("*-signal/manifest.json")):
+            self.assertIsNone(controller.poll())
+            time.sleep(0.1)
+        program.kill()
+        self.ended(controller)
+        recorder.communicate(timeout=60)
+        flight, = (self.folder / "log").glob("*-signal")
+        replay = subprocess.run([BIN / "kerf-replay", flight], capture_output=True, text=True, timeout=60, check=False)
+        self.assertEqual((replay.returncode, replay.stdout), (2, ""), replay.stderr)
+        self.assertRegex(replay.stderr, r"of the first \d+ ticks the force of the program is not in it; record the run whole")
 
     def test_what_is_no_force_is_refused_and_counted_and_nothing_is_felt(self):
         controller = self.controller()
