@@ -21,8 +21,7 @@ class LockStepPort final : public PacketPort {
  public:
   /// `device` outlives it.
   LockStepPort(PacketDevice& device, Personality personality, int rate_hz)
-      : LockStepPort(device, kCyclesPerSecond / rate_hz,
-                     personality == Personality::omni || is_cartesian(personality)) {}
+      : LockStepPort(device, kCyclesPerSecond / rate_hz, kind_of(personality).streams) {}
   /// `device_first`: its packet comes before any of the host.
   LockStepPort(PacketDevice& device, int tick_cycles, bool device_first)
       : device_(device), tick_cycles_(tick_cycles) {

@@ -58,10 +58,14 @@ double number_within(std::string_view part, std::string_view value, double low, 
   refuse(part, "give a number from " + number_text(low) + " to " + number_text(high));
 }
 
+const LibraryKind* library_of(Personality personality) {
+  const auto* const found = std::ranges::find(kLibraries, personality, &LibraryKind::personality);
+  return found == kLibraries.end() ? nullptr : found;
+}
+
 Personality device_of(std::string_view part, std::string_view value) {
-  for (const Personality device : {Personality::touch, Personality::omega}) {
-    if (word_of(device) == value) return device;
-  }
+  const auto device = personality_of(value);
+  if (device && library_of(*device) != nullptr) return *device;
   refuse(part, "take touch or omega");
 }
 
@@ -160,7 +164,7 @@ std::string free_name(const Settings& settings, Personality kind, std::size_t nu
       return device.kind == kind && device.name == name;
     });
   };
-  const std::string first(kind == Personality::touch ? kDefaultDevice : kDefaultOmega);
+  const std::string first(library_of(kind)->first_name);
   for (;; ++number) {
     std::string name = number == 1 ? first : first + ' ' + std::to_string(number);
     if (!is_taken(name)) return name;
@@ -179,7 +183,7 @@ void finish(Settings& settings) {
       if (other.name == device.name) {
         refuse("name=" + device.name, "two devices of a kind have it; give each its own");
       }
-      if (device.kind == Personality::touch && other.rate_hz != device.rate_hz) {
+      if (library_of(device.kind)->has_one_servo && other.rate_hz != device.rate_hz) {
         refuse("rate=" + std::to_string(device.rate_hz),
                "one servo thread serves all of a program");
       }

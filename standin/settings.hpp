@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -19,14 +20,20 @@ inline constexpr const char* kVariable = "KERF_STAND_IN";
 /// has published.
 inline constexpr std::size_t kMostDevices = 4;
 
-/// The name of HD's default device.
-inline constexpr std::string_view kDefaultDevice = "Default Device";
-inline constexpr std::string_view kDefaultOmega = "omega.3";
+/// A vendor's library that is imitated.
+struct LibraryKind {
+  Personality personality;      ///< of the devices that it serves
+  std::string_view first_name;  ///< of its first device, if the settings give none
+  bool has_one_servo;           ///< one servo thread for all devices of a program
+};
+inline constexpr LibraryKind kHd{Personality::touch, "Default Device", true};
+inline constexpr LibraryKind kDhd{Personality::omega, "omega.3", false};
+inline constexpr std::array kLibraries{kHd, kDhd};
 
 /// One emulated device.
 struct DeviceSettings {
   std::string socket;  ///< path of the socket that its kerf-emulator serves
-  Personality kind = Personality::touch;
+  Personality kind = kHd.personality;
   std::string name;    ///< HD: by which it is opened; none twice of a kind
   int rate_hz = 1000;  ///< of the servo thread (HD; one for all), of force commands (dhd)
   std::string ledger;  ///< file of its counts; empty: none is kept

@@ -318,29 +318,45 @@ std::size_t WoodenDriver::compose_release(Packet& packet) const noexcept {
   return packet_bytes_.load(std::memory_order_relaxed);
 }
 
+namespace {
+
+using EncoderSign = std::optional<std::array<double, 3>>;
+
+template <class Driver>
+std::unique_ptr<DeviceDriver> plain_driver(Personality, PacketPort& port, const EncoderSign&) {
+  return std::make_unique<Driver>(port);
+}
+
+std::unique_ptr<DeviceDriver> wooden_driver(Personality, PacketPort& port,
+                                            const EncoderSign& encoder_sign) {
+  const auto sign = encoder_sign.value_or(std::array{1.0, 1.0, 1.0});
+  return std::make_unique<WoodenDriver>(
+      port, std::array{sign[0] < 0 ? -1 : 1, sign[1] < 0 ? -1 : 1, sign[2] < 0 ? -1 : 1});
+}
+
+std::unique_ptr<DeviceDriver> cartesian_driver(Personality personality, PacketPort& port,
+                                               const EncoderSign&) {
+  return std::make_unique<CartesianDriver>(port, cartesian::figures(personality)->step_um);
+}
+
+struct DriverKind {
+  Personality personality;
+  std::unique_ptr<DeviceDriver> (*make)(Personality, PacketPort&, const EncoderSign&);
+};
+constexpr std::array kDrivers{DriverKind{Personality::omni, plain_driver<OmniDriver>},
+                              DriverKind{Personality::falcon, plain_driver<FalconDriver>},
+                              DriverKind{Personality::woodenhaptics, wooden_driver},
+                              DriverKind{Personality::inverse3, cartesian_driver},
+                              DriverKind{Personality::touch, cartesian_driver},
+                              DriverKind{Personality::omega, cartesian_driver}};
+static_assert(covers_devices(kDrivers));
+
+}  // namespace
+
 std::unique_ptr<DeviceDriver> make_driver(Personality personality, PacketPort& port,
                                           const std::optional<std::array<double, 3>>& encoder_sign,
                                           int rate_hz) {
-  std::unique_ptr<DeviceDriver> driver;
-  switch (personality) {
-    case Personality::omni:
-      driver = std::make_unique<OmniDriver>(port);
-      break;
-    case Personality::falcon:
-      driver = std::make_unique<FalconDriver>(port);
-      break;
-    case Personality::woodenhaptics: {
-      const auto sign = encoder_sign.value_or(std::array{1.0, 1.0, 1.0});
-      driver = std::make_unique<WoodenDriver>(
-          port, std::array{sign[0] < 0 ? -1 : 1, sign[1] < 0 ? -1 : 1, sign[2] < 0 ? -1 : 1});
-      break;
-    }
-    case Personality::inverse3:
-    case Personality::touch:
-    case Personality::omega:
-      driver = std::make_unique<CartesianDriver>(port, cartesian::figures(personality)->step_um);
-      break;
-  }
+  auto driver = row_of(kDrivers, personality).make(personality, port, encoder_sign);
   driver->set_rate(rate_hz);
   return driver;
 }

@@ -66,10 +66,6 @@ namespace {
 
 constexpr std::string_view kSocket = "socket:";
 constexpr std::string_view kUdp = "udp:";
-/// By Personality.
-constexpr std::array<std::string_view, 6> kBusOf{"fw", "usb", "hid", "arm", "arm", "arm"};
-static_assert(kBusOf.size() == kPersonalityWords.size());
-
 struct Request {
   const LinkHello& ours;
   int patience_ms = 0;
@@ -174,13 +170,12 @@ void check_port(const std::string& text) {
 }
 
 std::string resolve_port(const std::string& text, Personality personality) {
-  const auto device = static_cast<std::size_t>(personality);
-  if (text == "auto") return std::string(kBusOf[device]);
-  for (const std::string_view bus : kBusOf) {
-    if (bus == kBusOf[device] || !after(bus, text)) continue;
-    throw std::runtime_error("--port " + text + ": not for --device " +
-                             std::string(kPersonalityWords[device]) + "; take " +
-                             std::string(kBusOf[device]) + ", or another --device");
+  const DeviceKind& device = kind_of(personality);
+  if (text == "auto") return std::string(device.port);
+  for (const DeviceKind& other : kDeviceKinds) {
+    if (other.port == device.port || !after(other.port, text)) continue;
+    throw std::runtime_error("--port " + text + ": not for --device " + std::string(device.word) +
+                             "; take " + std::string(device.port) + ", or another --device");
   }
   return text;
 }

@@ -25,31 +25,39 @@ constexpr std::array<const char*, kKinds> kWaits{"",
                                                  "waiting until at rest",
                                                  "waiting to be taken"};
 
-/// By personality; an Omni needs no homing.
-constexpr std::array<std::array<const char*, kKinds>, kPersonalityWords.size()> kDeeds{
-    {{"", "unplug it and plug it in again", "", "rest the stylus in the inkwell",
-      "let go of the stylus in the inkwell", "take the stylus out of the inkwell"},
-     {"", "load its firmware (docs/devices.md), or unplug it and plug it in again",
-      "pull the grip all the way out, then push it in", "hold the grip's centre button, at rest",
-      "hold the grip still, its centre button held", "let go of the grip's centre button"},
-     {"", "unplug it and plug it in again", "hold the home pose, press its calibration button",
-      "hold the home pose, press its calibration button", "hold the home pose still",
-      "move the arm away from its home pose"},
-     {"", "start the vendor's service, and wake the handle",
-      "hold the handle's parking button; if a line above names what is missing, see to that first",
-      "hold the handle's parking button", "hold the handle still, its parking button held",
-      "let go of the handle's parking button"},
-     {"", "start ./kerf arm, or unplug the device and plug it in again",
-      "rest the stylus in the inkwell", "rest the stylus in the inkwell",
-      "let go of the stylus in the inkwell", "take the stylus out of the inkwell"},
-     {"", "start ./kerf arm, or switch the device on", "initialise it with the vendor's tool",
-      "hold its button, at rest", "hold the grip still, its button held", "let go of its button"}}};
-static_assert(static_cast<std::size_t>(Personality::omni) == 0 &&
-              static_cast<std::size_t>(Personality::falcon) == 1 &&
-              static_cast<std::size_t>(Personality::woodenhaptics) == 2 &&
-              static_cast<std::size_t>(Personality::inverse3) == 3 &&
-              static_cast<std::size_t>(Personality::touch) == 4 &&
-              static_cast<std::size_t>(Personality::omega) == 5);
+/// What the user does about each kind of waiting; an Omni needs no homing.
+struct Deeds {
+  Personality personality;
+  std::array<const char*, kKinds> of_waiting;
+};
+constexpr std::array kDeeds{
+    Deeds{Personality::omni,
+          {"", "unplug it and plug it in again", "", "rest the stylus in the inkwell",
+           "let go of the stylus in the inkwell", "take the stylus out of the inkwell"}},
+    Deeds{
+        Personality::falcon,
+        {"", "load its firmware (docs/devices.md), or unplug it and plug it in again",
+         "pull the grip all the way out, then push it in", "hold the grip's centre button, at rest",
+         "hold the grip still, its centre button held", "let go of the grip's centre button"}},
+    Deeds{Personality::woodenhaptics,
+          {"", "unplug it and plug it in again", "hold the home pose, press its calibration button",
+           "hold the home pose, press its calibration button", "hold the home pose still",
+           "move the arm away from its home pose"}},
+    Deeds{Personality::inverse3,
+          {"", "start the vendor's service, and wake the handle",
+           "hold the handle's parking button; if a line above names what is missing, see to that "
+           "first",
+           "hold the handle's parking button", "hold the handle still, its parking button held",
+           "let go of the handle's parking button"}},
+    Deeds{Personality::touch,
+          {"", "start ./kerf arm, or unplug the device and plug it in again",
+           "rest the stylus in the inkwell", "rest the stylus in the inkwell",
+           "let go of the stylus in the inkwell", "take the stylus out of the inkwell"}},
+    Deeds{Personality::omega,
+          {"", "start ./kerf arm, or switch the device on", "initialise it with the vendor's tool",
+           "hold its button, at rest", "hold the grip still, its button held",
+           "let go of its button"}}};
+static_assert(covers_devices(kDeeds));
 
 }  // namespace
 
@@ -72,7 +80,7 @@ Waiting waiting_for(const DeviceReport& report, const ServoOutput& output) noexc
 
 const char* action_for(Personality personality, Waiting waiting) noexcept {
   if (waiting == Waiting::gone) return "connect it again; the other one goes on";
-  return kDeeds[static_cast<std::size_t>(personality)][static_cast<std::size_t>(waiting)];
+  return row_of(kDeeds, personality).of_waiting[static_cast<std::size_t>(waiting)];
 }
 
 std::string text_of(Personality personality, Waiting waiting) {

@@ -99,8 +99,8 @@ class CompiledSceneOf final : public CompiledScene {
 
   [[nodiscard]] std::size_t arms() const noexcept override { return arms_.size(); }
   [[nodiscard]] DeviceReport::Kind report_kind(std::size_t arm) const noexcept override {
-    return is_cartesian(arms_[arm].plan->device.personality) ? DeviceReport::Kind::pose
-                                                             : DeviceReport::Kind::joints;
+    return arms_[arm].plan->device.kinematics == Kinematics::axes ? DeviceReport::Kind::pose
+                                                                  : DeviceReport::Kind::joints;
   }
   using AnyServo::step;
   void step(std::span<const DeviceReport> reports,

@@ -24,40 +24,82 @@ namespace kerf {
 
 namespace device_parts {
 
-/// Map from the encoder to a joint of the servo's kinematics, and from the joint to its motor.
+/// Links of a serial arm, mm, as SerialArm.
+struct Links {
+  double thigh_mm = 0, forearm_mm = 0, origin_height_mm = 0, origin_depth_mm = 0;
+};
+
+/// Encoders, motors and links of a joint-count device. Joints turret, thigh and forearm of a serial
+/// arm; the legs of a delta.
+struct CountedArm {
+  Personality personality;
+  std::array<double, 3> zero_rad;  ///< angle where the count is 0, if it does not count from a dock
+  std::array<double, 3> rad_per_count;  ///< signed
+  std::array<double, 3> motor_sign;     ///< of the count that gives a positive torque
+  std::int32_t motor_count_end;
+  /// Largest error of the tip from encoders that are rounded to whole counts: half a count of one
+  /// joint with the whole arm.
+  double tip_noise_mm;
+  Links links = {};  ///< of a serial arm
+};
+
+inline constexpr std::array kCountedArms{
+    CountedArm{.personality = Personality::omni,
+               .zero_rad = {},
+               .rad_per_count = {omni::kEncoderSign[0] * omni::kRadPerCount,
+                                 omni::kEncoderSign[1] * omni::kRadPerCount,
+                                 omni::kEncoderSign[2] * omni::kRadPerCount},
+               .motor_sign = {1, 1, 1},
+               .motor_count_end = -omni::kMotorCountMin,
+               // 0.056; in its data sheet 0.055.
+               .tip_noise_mm = omni::kRadPerCount * (omni::kUpperLinkMm + omni::kForearmMm) / 2,
+               .links = {omni::kUpperLinkMm, omni::kForearmMm, omni::kOriginHeightMm,
+                         omni::kOriginDepthMm}},
+    CountedArm{.personality = Personality::falcon,
+               .zero_rad = {falcon::kZeroRad, falcon::kZeroRad, falcon::kZeroRad},
+               .rad_per_count = {falcon::kRadPerCount, falcon::kRadPerCount, falcon::kRadPerCount},
+               .motor_sign = {falcon::kMotorSign, falcon::kMotorSign, falcon::kMotorSign},
+               .motor_count_end = falcon::kMotorCountMax,
+               .tip_noise_mm = falcon::kRadPerCount * falcon::kThighMm / 2},
+    CountedArm{
+        .personality = Personality::woodenhaptics,  // A = -q1, B = pi/2 - q2, C = q3
+        .zero_rad = {0, wooden::kPi / 2, 0},
+        .rad_per_count = {-wooden::kRadPerCount[0], -wooden::kRadPerCount[1],
+                          wooden::kRadPerCount[2]},
+        .motor_sign = {-1, -1, 1},
+        .motor_count_end = wooden::kMaxMilliamps,
+        .tip_noise_mm = wooden::kRadPerCount[1] * (wooden::kUpperLinkMm + wooden::kForearmMm) / 2,
+        .links = {wooden::kUpperLinkMm, wooden::kForearmMm,
+                  wooden::kShoulderHeightMm - wooden::kOriginHeightMm, wooden::kOriginDepthMm}}};
+
+/// Null for a Cartesian device.
+constexpr const CountedArm* counted_arm(Personality personality) {
+  const auto* const found = std::ranges::find(kCountedArms, personality, &CountedArm::personality);
+  return found == kCountedArms.end() ? nullptr : found;
+}
+static_assert(std::ranges::all_of(kDeviceKinds, [](const DeviceKind& kind) {
+  return kind.axes.has_value() != (counted_arm(kind.personality) != nullptr);
+}));
+
+/// Map from the encoder to a joint of the servo's kinematics, and from the joint to its motor. Of a
+/// Cartesian device the joints are its axes, in mm.
 struct JointSense {
-  double home_rad = 0;       ///< angle where the count is 0
+  double home_rad = 0;       ///< where the count is 0
   double rad_per_count = 0;  ///< signed
   double motor_sign = 1;     ///< of the count that gives a positive torque; Cartesian: counts per N
 };
 
-/// Joints turret, thigh and forearm of a serial arm; the legs of the Falcon; the axes of a
-/// Cartesian device, in mm.
 inline std::array<JointSense, 3> joints_of(const DeviceSettings& device) {
   std::array<JointSense, 3> joints;
   if (const auto figures = cartesian::figures(device.personality)) {
     joints.fill({0, figures->step_um / 1000.0, 1 / cartesian::kNewtonsPerCount});
     return joints;
   }
+  const CountedArm& arm = *counted_arm(device.personality);
+  const bool from_dock = kind_of(device.personality).counts_from_dock;
   for (std::size_t i = 0; i < 3; ++i) {
-    switch (device.personality) {
-      case Personality::omni:
-        joints[i] = {device.dock_rad[i], omni::kEncoderSign[i] * omni::kRadPerCount, 1};
-        break;
-      case Personality::falcon:
-        joints[i] = {falcon::kZeroRad, falcon::kRadPerCount, double(falcon::kMotorSign)};
-        break;
-      case Personality::woodenhaptics: {
-        constexpr std::array<double, 3> kSign{-1, -1, 1};  // A = -q1, B = pi/2 - q2, C = q3
-        constexpr std::array<double, 3> kZeroRad{0, wooden::kPi / 2, 0};
-        joints[i] = {kZeroRad[i], kSign[i] * wooden::kRadPerCount[i], kSign[i]};
-        break;
-      }
-      case Personality::inverse3:
-      case Personality::touch:
-      case Personality::omega:
-        break;  // above
-    }
+    joints[i] = {from_dock ? device.dock_rad[i] : arm.zero_rad[i], arm.rad_per_count[i],
+                 arm.motor_sign[i]};
   }
   return joints;
 }
@@ -65,13 +107,10 @@ inline std::array<JointSense, 3> joints_of(const DeviceSettings& device) {
 template <class N>
 SerialArm<N> serial_arm_of(Personality personality) {
   using Real = typename N::Real;
-  if (personality == Personality::woodenhaptics) {
-    return {Real(wooden::kUpperLinkMm), Real(wooden::kForearmMm),
-            Real(wooden::kShoulderHeightMm - wooden::kOriginHeightMm),
-            Real(wooden::kOriginDepthMm)};
-  }
-  return {Real(omni::kUpperLinkMm), Real(omni::kForearmMm), Real(omni::kOriginHeightMm),
-          Real(omni::kOriginDepthMm)};
+  const CountedArm* const arm = counted_arm(personality);
+  const Links links = arm != nullptr ? arm->links : Links{};
+  return {Real(links.thigh_mm), Real(links.forearm_mm), Real(links.origin_height_mm),
+          Real(links.origin_depth_mm)};
 }
 
 template <class N>
@@ -93,35 +132,14 @@ DeltaArm<N> delta_arm() {
 }
 
 inline std::int32_t motor_count_end(Personality personality) {
-  switch (personality) {
-    case Personality::omni:
-      return -omni::kMotorCountMin;
-    case Personality::falcon:
-      return falcon::kMotorCountMax;
-    case Personality::woodenhaptics:
-      return wooden::kMaxMilliamps;
-    case Personality::inverse3:
-    case Personality::touch:
-    case Personality::omega:
-      break;
-  }
+  if (const CountedArm* const arm = counted_arm(personality)) return arm->motor_count_end;
   return static_cast<std::int32_t>(force_figures(personality).peak_n / cartesian::kNewtonsPerCount);
 }
 
-/// Largest error of the tip from encoders that are rounded to whole counts: half a count of one
-/// joint with the whole arm. For the Omni that is 0.056 mm, in its data sheet 0.055. For a
-/// Cartesian device, half of its resolution.
+/// Largest error of the tip that the device reports. For a Cartesian one, half of its resolution.
 inline double tip_noise_mm(Personality personality) {
-  if (const auto figures = cartesian::figures(personality)) return figures->quantum_um / 2000.0;
-  switch (personality) {
-    case Personality::omni:
-      return omni::kRadPerCount * (omni::kUpperLinkMm + omni::kForearmMm) / 2;
-    case Personality::falcon:
-      return falcon::kRadPerCount * falcon::kThighMm / 2;
-    default:
-      break;
-  }
-  return wooden::kRadPerCount[1] * (wooden::kUpperLinkMm + wooden::kForearmMm) / 2;
+  if (const CountedArm* const arm = counted_arm(personality)) return arm->tip_noise_mm;
+  return cartesian::figures(personality)->quantum_um / 2000.0;
 }
 
 /// Largest distance from its first calibration at which a joint that is parked at rest is
@@ -141,10 +159,9 @@ inline std::int32_t rest_counts(Personality personality) {
 
 /// The same in counts; `anywhere` for a device without a dock.
 inline std::int32_t dock_counts(Personality personality, double per_count, std::int32_t anywhere) {
-  const auto figures = cartesian::figures(personality);
-  const bool has_dock = figures ? figures->has_dock : personality != Personality::falcon;
-  if (!has_dock) return anywhere;
-  return static_cast<std::int32_t>((figures ? kDockPlayMm : kDockPlayRad) / std::abs(per_count));
+  if (!kind_of(personality).has_dock) return anywhere;
+  return static_cast<std::int32_t>((is_cartesian(personality) ? kDockPlayMm : kDockPlayRad) /
+                                   std::abs(per_count));
 }
 
 }  // namespace device_parts
@@ -157,8 +174,10 @@ void plan_device(const DeviceSettings& device, ServoPlan<N>& plan) {
   plan.offset_mm = rounded<WorldVec<Real>, Real>(device.offset_mm);
 
   DevicePlan<N>& arm = plan.device;
-  arm.personality = device.personality;
-  arm.absolute_encoders = device.personality != Personality::omni;
+  const DeviceKind& kind = kind_of(device.personality);
+  arm.kinematics = kind.kinematics;
+  arm.has_gimbal = kind.has_pots;
+  arm.absolute_encoders = !kind.counts_from_dock;
   arm.serial = device_parts::serial_arm_of<N>(device.personality);
   arm.delta = device_parts::delta_arm<N>();
   arm.motor_count_end = device_parts::motor_count_end(device.personality);

@@ -122,7 +122,7 @@ void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& se
   } else if (!seen.calibrated) {
     lacks_deed(": not calibrated", Waiting::parked);
   }
-  if (device.personality == Personality::woodenhaptics && !device.encoder_sign) {
+  if (kind_of(device.personality).needs_encoder_sign && !device.encoder_sign) {
     lacks.push_back({name + ": device.encoder_sign is not set; the makers' branches differ in it",
                      "push the tip to the right, up, towards you: x, y, z must rise, else turn a "
                      "sign: docs/devices.md"});

@@ -72,7 +72,7 @@ class ProbeView {
 
 /// A device with a driver in kerf, as the kernel lists it.
 struct DeviceNode {
-  Personality personality = Personality::omni;
+  Personality personality{};
   std::string path;    ///< of its node in /dev; of the Inverse3 its service's address
   int open_error = 0;  ///< errno of opening it as this user; 0: may read and write
 };

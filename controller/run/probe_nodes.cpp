@@ -144,15 +144,51 @@ bool listens_at(const fs::path& root, std::uint16_t port) {
   return false;
 }
 
-void list(const fs::path& root, const char* folder, Personality personality, NodeOf node_of,
-          std::vector<DeviceNode>& nodes) {
+/// Where the kernel lists a kind of device, and commands to find it by hand.
+struct NodeKind {
+  Personality personality;
+  const char* folder;   ///< of sysfs, with an entry for each device
+  NodeOf node_of;       ///< null: its vendor's service holds the node
+  const char* bus;      ///< in sysfs, if the kernel has this bus
+  const char* missing;  ///< command if it has not
+  const char* absent;   ///< command if it has, without the device
+};
+
+constexpr const char* kUsbFolder = "sys/bus/usb/devices";
+constexpr const char* kUsbBus = "sys/bus/usb";
+constexpr const char* kNoUsb = "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)";
+constexpr std::array kNodeKinds{
+    NodeKind{Personality::omni, "sys/bus/firewire/devices", firewire_node, "sys/bus/firewire",
+             "sudo modprobe firewire-ohci (is there a card? lspci | grep 1394)",
+             "connect and power it, then: sudo dmesg | grep firewire"},
+    NodeKind{Personality::falcon, kUsbFolder, falcon_node, kUsbBus, kNoUsb,
+             "connect and power it, then: lsusb -d 0403:cb48"},
+    NodeKind{Personality::woodenhaptics, "sys/class/hidraw", wooden_node, "sys/class/hidraw",
+             "sudo modprobe usbhid",
+             "connect and power it, then: lsusb -d 1234:0006; lsusb -d 16c0:0486"},
+    NodeKind{Personality::inverse3, kUsbFolder, nullptr, kUsbBus, kNoUsb,
+             "connect and power it, then: lsusb -d 16c0:0483; systemctl status "
+             "haply-inverse-service"},
+    NodeKind{Personality::touch, kUsbFolder, touch_node, kUsbBus, kNoUsb,
+             "connect and power it, then: lsusb -d 2988:; ./kerf arm --device touch"},
+    NodeKind{Personality::omega, kUsbFolder, omega_node, kUsbBus, kNoUsb,
+             "connect and power it, then: lsusb -d 1451:; ./kerf arm --device omega"}};
+static_assert(covers_devices(kNodeKinds));
+
+void list(const fs::path& root, const NodeKind& kind, std::vector<DeviceNode>& nodes) {
+  if (kind.node_of == nullptr) {
+    if (has_inverse3_port(root) && listens_at(root, inverse3::kServicePort)) {
+      nodes.push_back({kind.personality, "127.0.0.1:" + std::to_string(inverse3::kServicePort), 0});
+    }
+    return;
+  }
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(root / folder, ignored)) {
-    const auto name = node_of(entry.path());
+  for (const auto& entry : fs::directory_iterator(root / kind.folder, ignored)) {
+    const auto name = kind.node_of(entry.path());
     if (!name) continue;
     const std::string path = (root / "dev" / *name).string();
     const bool open = faccessat(AT_FDCWD, path.c_str(), R_OK | W_OK, AT_EACCESS) == 0;
-    nodes.push_back({personality, path, open ? 0 : errno});
+    nodes.push_back({kind.personality, path, open ? 0 : errno});
   }
 }
 
@@ -160,15 +196,7 @@ void list(const fs::path& root, const char* folder, Personality personality, Nod
 
 std::vector<DeviceNode> list_device_nodes(const fs::path& root) {
   std::vector<DeviceNode> nodes;
-  list(root, "sys/bus/firewire/devices", Personality::omni, firewire_node, nodes);
-  list(root, "sys/bus/usb/devices", Personality::falcon, falcon_node, nodes);
-  list(root, "sys/class/hidraw", Personality::woodenhaptics, wooden_node, nodes);
-  list(root, "sys/bus/usb/devices", Personality::touch, touch_node, nodes);
-  list(root, "sys/bus/usb/devices", Personality::omega, omega_node, nodes);
-  if (has_inverse3_port(root) && listens_at(root, inverse3::kServicePort)) {
-    nodes.push_back(
-        {Personality::inverse3, "127.0.0.1:" + std::to_string(inverse3::kServicePort), 0});
-  }
+  for (const NodeKind& kind : kNodeKinds) list(root, kind, nodes);
   std::ranges::sort(nodes, {}, &DeviceNode::path);
   return nodes;
 }
@@ -177,39 +205,6 @@ namespace {
 
 constexpr const char* kRules = "60-kerf.rules";
 constexpr std::size_t kServoMemoryBytes = std::size_t{1} << 30;  // of a large scene
-
-/// The bus of a device in sysfs, and commands to find it by hand.
-struct Bus {
-  const char* sysfs;
-  const char* missing;  ///< command if the kernel has no such bus
-  const char* absent;   ///< command if it has, without the device
-};
-
-Bus bus_of(Personality personality) {
-  switch (personality) {
-    case Personality::omni:
-      return {"sys/bus/firewire",
-              "sudo modprobe firewire-ohci (is there a card? lspci | grep 1394)",
-              "connect and power it, then: sudo dmesg | grep firewire"};
-    case Personality::falcon:
-      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
-              "connect and power it, then: lsusb -d 0403:cb48"};
-    case Personality::inverse3:
-      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
-              "connect and power it, then: lsusb -d 16c0:0483; systemctl status "
-              "haply-inverse-service"};
-    case Personality::touch:
-      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
-              "connect and power it, then: lsusb -d 2988:; ./kerf arm --device touch"};
-    case Personality::omega:
-      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
-              "connect and power it, then: lsusb -d 1451:; ./kerf arm --device omega"};
-    case Personality::woodenhaptics:
-      break;
-  }
-  return {"sys/class/hidraw", "sudo modprobe usbhid",
-          "connect and power it, then: lsusb -d 1234:0006; lsusb -d 16c0:0486"};
-}
 
 bool rules_installed(const fs::path& root) {
   constexpr std::array kFolders{"etc/udev/rules.d", "usr/local/lib/udev/rules.d",
@@ -266,19 +261,20 @@ std::vector<SetupProblem> lacks_of_nodes(std::optional<Personality> which,
     lacks.push_back(
         {node.path + ": " + std::generic_category().message(node.open_error), cure_of_right(root)});
   }
-  if (which == Personality::inverse3 && !found && has_inverse3_port(root)) {
+  if (!which || found) return lacks;
+  const NodeKind& kind = row_of(kNodeKinds, *which);
+  if (kind.node_of == nullptr && has_inverse3_port(root)) {
     lacks.push_back(
         {"inverse3: no service listens at port " + std::to_string(inverse3::kServicePort),
          "sudo systemctl start haply-inverse-service (version 3.1 or newer)"});
-  } else if (which && !found) {
-    const Bus bus = bus_of(*which);
-    std::error_code ignored;
-    const bool has_bus = fs::exists(root / bus.sysfs, ignored);
-    const std::string name(word_of(*which));
-    lacks.push_back({name + (has_bus ? ": none is connected"
-                                     : ": the kernel has no /" + std::string(bus.sysfs)),
-                     has_bus ? bus.absent : bus.missing});
+    return lacks;
   }
+  std::error_code ignored;
+  const bool has_bus = fs::exists(root / kind.bus, ignored);
+  const std::string name(word_of(*which));
+  lacks.push_back(
+      {name + (has_bus ? ": none is connected" : ": the kernel has no /" + std::string(kind.bus)),
+       has_bus ? kind.absent : kind.missing});
   return lacks;
 }
 

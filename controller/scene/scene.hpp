@@ -126,7 +126,7 @@ inline constexpr int kMostDenoise =
 
 /// [device]
 struct DeviceSettings {
-  Personality personality = Personality::omni;
+  Personality personality{};
   double workspace_scale = 1.0;  ///< x_scene = scale * x_device
   bool fit = false;              ///< the scale follows from the first volume
   std::array<double, 3> offset_mm{0, 0, 0};

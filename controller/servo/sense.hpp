@@ -86,7 +86,7 @@ inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& dev
     encoders.unwrapped[i] = static_cast<std::int32_t>(
         std::clamp(std::int64_t{encoders.unwrapped[i]} + step, -kEnd, kEnd));
     // The position of a Cartesian device is whole in its counts, so it is taken, not summed up.
-    if (is_cartesian(device.personality)) encoders.unwrapped[i] = report.counts[i];
+    if (device.kinematics == Kinematics::axes) encoders.unwrapped[i] = report.counts[i];
     encoders.last[i] = report.counts[i];
     const auto moved =
         absolute ? step : static_cast<std::int16_t>(report.counts[i] - encoders.rest_from[i]);
@@ -144,7 +144,7 @@ template <class N>
 template <class N>
 [[nodiscard]] DevicePose<N> device_pose(const DevicePlan<N>& device, const EncoderState& encoders,
                                         const GimbalFilter& gimbal) noexcept {
-  if (is_cartesian(device.personality)) {
+  if (device.kinematics == Kinematics::axes) {
     DevicePose<N> pose;
     pose.arm = cartesian_pose<N>({length_mm(device.joints[0], encoders.unwrapped[0]),
                                   length_mm(device.joints[1], encoders.unwrapped[1]),
@@ -157,13 +157,13 @@ template <class N>
     angles[i] = joint_angle(device.joints[i], encoders.unwrapped[i]);
   }
   DevicePose<N> pose;
-  if (device.personality == Personality::falcon) {
+  if (device.kinematics == Kinematics::delta) {
     pose.arm = delta_arm_pose(device.delta, angles);
     return pose;
   }
   const SerialJoints<N> joints{angles[0], angles[1], angles[2]};
   pose.arm = serial_arm_pose(device.serial, joints);
-  if (device.personality == Personality::omni) {
+  if (device.has_gimbal) {
     pose.gimbal = omni_gimbal<N>({gimbal.sum[0], gimbal.sum[1], gimbal.sum[2]},
                                  {gimbal.sum[3], gimbal.sum[4], gimbal.sum[5]});
     pose.rotation = omni_orientation<N>(joints, pose.gimbal);
@@ -228,7 +228,7 @@ template <class N>
   seen.calibrated = rest == Rest::docked;
   seen.misplaced = rest == Rest::elsewhere;
   if (report.fresh) {
-    if (is_cartesian(plan.device.personality)) {
+    if (plan.device.kinematics == Kinematics::axes) {
       state.gimbal.orientation = report.orientation;
     } else {
       follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);

@@ -122,7 +122,8 @@ inline constexpr std::size_t kMaxGimbalSamples = 160;
 /// Everything constant of the held device.
 template <class N>
 struct DevicePlan {
-  Personality personality = Personality::omni;
+  Kinematics kinematics = Kinematics::serial;
+  bool has_gimbal = false;  ///< of potentiometers, as the Omni's
   std::array<JointPlan<N>, 3> joints{};
   /// True: encoders are absolute once the device is `homed`. False: they count from the pose in
   /// which it was parked at rest.
@@ -133,8 +134,8 @@ struct DevicePlan {
   /// Largest distance from the first calibration at which parking at rest calibrates a joint,
   /// counts; `kNoDock`: any.
   std::array<std::int32_t, 3> dock_counts{kNoDock, kNoDock, kNoDock};
-  SerialArm<N> serial{};  ///< of the Omni and WoodenHaptics
-  DeltaArm<N> delta{};    ///< of the Falcon
+  SerialArm<N> serial{};  ///< of Kinematics::serial
+  DeltaArm<N> delta{};    ///< of Kinematics::delta
 
   std::size_t gimbal_samples = 1;  ///< in 20 ms, of a device with a gimbal
 

@@ -13,6 +13,7 @@ namespace kerf {
 /// Figures of a device at its tip, from published sources (docs/devices.md, "Gains"). No unit was
 /// measured: a row is for checks and maps, never a claim about a unit.
 struct DeviceFigures {
+  Personality personality;
   double mass_kg;  ///< apparent
   /// No source has a value: the lowest that identifications of such arms suggest. Less damping is
   /// the worse case.
@@ -28,24 +29,24 @@ struct DeviceFigures {
   std::string_view gains_from;  ///< empty: no source has gains of this device, both are assumed
 };
 
-[[nodiscard]] constexpr DeviceFigures device_figures(Personality personality) noexcept {
-  constexpr std::string_view kChai3d = "CHAI3D 3.3.0";
-  switch (personality) {
-    case Personality::omni:  // data sheet; gains: CPhantomDevices, "PHANTOM Omni"
-      return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005, kChai3d};
-    case Personality::falcon:  // mass, friction: the emulator's; quantum: a count of a leg; gains:
-      return {0.12, 0.0002, 0.3, 0.038, 0.002, 3.0, 0.02, kChai3d};  // CDeltaDevices, "Falcon"
-    case Personality::inverse3:  // step: the vendor's claim; all else: assumed
-      return {0.2, 0.0002, 0.1, 0.01, 0.002, 1.0, 0.01, {}};
-    case Personality::touch:  // as the Omni, whose mechanics it has; gains: the row "Touch" there
-      return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.4, 0.004, kChai3d};
-    case Personality::omega:  // gains: CDeltaDevices, "omega.3"; mass, friction: assumed
-      return {0.2, 0.0002, 0.1, 0.01, 0.002, 5.0, 0.03, kChai3d};
-    case Personality::woodenhaptics:  // mass, friction: the emulator's
-      break;
-  }
-  // Gains: CWoodenDevice, default_woody(), of WoodenHaptics/woody-experimental, 23f74fda.
-  return {0.2, 0.0002, 0.2, 0.118, 0.002, 1.0, 0.008, "its open driver"};
+/// By Personality. Mass and friction: Omni and Touch, the Omni's data sheet; Falcon and
+/// WoodenHaptics, the emulator's; others assumed. Quantum: a count of the encoders, or the vendor's
+/// resolution. Gains: CHAI3D's CPhantomDevices ("PHANTOM Omni", "Touch") and CDeltaDevices
+/// ("Falcon", "omega.3"); CWoodenDevice, default_woody(), of WoodenHaptics/woody-experimental,
+/// 23f74fda.
+inline constexpr std::array kDeviceFigures{
+    DeviceFigures{Personality::omni, 0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005, "CHAI3D 3.3.0"},
+    DeviceFigures{Personality::falcon, 0.12, 0.0002, 0.3, 0.038, 0.002, 3.0, 0.02, "CHAI3D 3.3.0"},
+    DeviceFigures{Personality::woodenhaptics, 0.2, 0.0002, 0.2, 0.118, 0.002, 1.0, 0.008,
+                  "its open driver"},
+    DeviceFigures{Personality::inverse3, 0.2, 0.0002, 0.1, 0.01, 0.002, 1.0, 0.01, {}},
+    DeviceFigures{Personality::touch, 0.045, 0.0002, 0.26, 0.055, 0.002, 0.4, 0.004,
+                  "CHAI3D 3.3.0"},
+    DeviceFigures{Personality::omega, 0.2, 0.0002, 0.1, 0.01, 0.002, 5.0, 0.03, "CHAI3D 3.3.0"}};
+static_assert(covers_devices(kDeviceFigures));
+
+[[nodiscard]] constexpr const DeviceFigures& device_figures(Personality personality) noexcept {
+  return row_of(kDeviceFigures, personality);
 }
 
 /// The loop of that device at a rate, without a hand: a light grip is the worst case, since the

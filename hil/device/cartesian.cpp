@@ -54,9 +54,9 @@ bool CartesianArm::stop_at_limits(JointVec<double>& q, DeviceVec<double>& tip_mm
 
 CartesianParams::CartesianParams(Personality which) : personality(which) {
   torque_nmm_per_count.fill(cartesian::kNewtonsPerCount);
-  if (which == Personality::touch) return;  // the mechanics of the Omni
-  tip_mass_kg = 0.2;
-  coulomb_n = 0.1;
+  const cartesian::Figures figures = *cartesian::figures(which);
+  tip_mass_kg = figures.tip_mass_kg;
+  coulomb_n = figures.coulomb_n;
 }
 
 CartesianModel::CartesianModel(const CartesianParams& params)
@@ -108,7 +108,9 @@ HandRoute CartesianModel::route() const {
                   .detour = {},
                   .hand_rad_per_s = params().hand_rad_per_s()};
   // An inkwell lies beside the workpiece: up, behind it, and over. Others rest above it.
-  if (figures_.has_dock) route.detour = HandRoute::Detour{.lift_mm = 25, .y_mm = 15, .z_mm = -60};
+  if (kind_of(params_.personality).has_dock) {
+    route.detour = HandRoute::Detour{.lift_mm = 25, .y_mm = 15, .z_mm = -60};
+  }
   return route;
 }
 

@@ -81,12 +81,12 @@ std::size_t known_at(const char* option, const std::string& value,
 
 /// Of the front's bus, and of lock-step on it.
 void check_rate(const EmulatorOptions& o) {
-  const bool is_omni = o.personality == Personality::omni || is_cartesian(o.personality);
-  const bool is_usb = o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && !is_omni);
+  const bool streams = kind_of(o.personality).streams;
+  const bool is_usb = o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && !streams);
   if (is_usb && o.lockstep) {
     throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
   }
-  const int fastest = is_omni ? kCyclesPerSecond : kUsbFramesPerSecond;
+  const int fastest = streams ? kCyclesPerSecond : kUsbFramesPerSecond;
   if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {
     throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
                    std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
@@ -178,8 +178,8 @@ void check_device(const EmulatorOptions& o) {
         "--silence-ms: the motors hold for ever; give --drop-torque too, or leave it "
         "out");
   }
-  if (o.drop_torque && o.personality == Personality::woodenhaptics) {
-    throw HilError("--drop-torque: woodenhaptics lets go after 0.5 s anyway; leave it out");
+  if (o.drop_torque && kind_of(o.personality).has_watchdog) {
+    throw HilError("--drop-torque: " + o.device + " lets go by itself; leave it out");
   }
   for (std::size_t i = 0; i < o.plant.size(); ++i) {
     const PlantKey& row = kPlantKeys[i];

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <ostream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -120,11 +121,10 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
     device.renew();
     HandshakeLink link(*client, hello_of(o));
     if (o.lockstep) {
-      const bool device_first = o.personality == Personality::omni || is_cartesian(o.personality);
       serve_lockstep(link, device,
                      {.tick_cycles = kCyclesPerSecond / o.rate_hz,
                       .empty_turns = !o.fault.empty(),
-                      .device_first = device_first},
+                      .device_first = kind_of(o.personality).streams},
                      limits, stats);
     } else {
       serve_real_time(link, device, o.packet_cycles, limits, stats);
@@ -251,18 +251,16 @@ WoodenHid::Settings wooden_settings(const EmulatorOptions& o) {
   return {.packet_bytes = o.packet_bytes, .script = usb_script(o.bus)};
 }
 
+/// The node that the device's port has in /dev. Others have none that is public: check() has
+/// refused them.
 void serve_on_fuse(const EmulatorOptions& o, BusService& service) {
-  switch (o.personality) {
-    case Personality::omni:
-      return serve_fuse(service, o.bus.mount, firewire_settings(o.bus, o.lockstep ? o.rate_hz : 0));
-    case Personality::falcon:
-      return serve_fuse(service, o.bus.mount, falcon_settings(o), usb_script(o.bus));
-    case Personality::woodenhaptics:
-      return serve_fuse(service, o.bus.mount, wooden_settings(o));
-    case Personality::inverse3:
-    case Personality::touch:
-    case Personality::omega:
-      break;  // check() has refused it: no node of theirs is public
+  const std::string_view port = kind_of(o.personality).port;
+  if (port == "fw") {
+    serve_fuse(service, o.bus.mount, firewire_settings(o.bus, o.lockstep ? o.rate_hz : 0));
+  } else if (port == "usb") {
+    serve_fuse(service, o.bus.mount, falcon_settings(o), usb_script(o.bus));
+  } else if (port == "hid") {
+    serve_fuse(service, o.bus.mount, wooden_settings(o));
   }
 }
 

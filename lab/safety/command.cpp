@@ -335,9 +335,9 @@ std::vector<Cell> Command::cells() const {
     throw HilError("--port ws: left out of this build; install libboost-dev, then build again");
   }
   for (const std::string& device : devices_) {
-    if (by_service && device != word_of(Personality::inverse3)) continue;
     SceneOverrides overrides;
-    overrides.personality = named<Personality>(device, kPersonalityWords);
+    overrides.personality = personality_of(device);
+    if (by_service && !kind_of(*overrides.personality).has_service) continue;
     overrides.torque_scale = torque_scale_of(*overrides.personality);
     overrides.phantom_size = VoxelGrid{64, 64, 40};
     for (const int rate_hz : rates()) {

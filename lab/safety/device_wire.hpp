@@ -54,18 +54,17 @@ class DeviceWire {
   [[nodiscard]] int count_end() const noexcept { return count_end_; }
   /// Whether the device itself does, so that readings that stand still are known to be new.
   [[nodiscard]] bool numbers_its_packets() const noexcept {
-    return personality_ == Personality::omni;
+    return device_.streams && device_.kinematics != Kinematics::axes;
   }
   /// Whether a calibration in a wrong pose moves every later one: encoders that count from it.
-  [[nodiscard]] bool counts_from_rest() const noexcept { return personality_ == Personality::omni; }
+  [[nodiscard]] bool counts_from_rest() const noexcept { return device_.counts_from_dock; }
   /// Whether it is parked at one place alone, where every calibration must be.
-  [[nodiscard]] bool has_dock() const noexcept {
-    return personality_ != Personality::falcon && personality_ != Personality::inverse3 &&
-           personality_ != Personality::omega;
-  }
+  [[nodiscard]] bool has_dock() const noexcept { return device_.has_dock; }
   /// How far from its first place a joint may rest parked, rad; mm of a Cartesian device. The play
   /// of a stylus in its inkwell.
-  [[nodiscard]] double dock_play() const noexcept { return is_cartesian(personality_) ? 3 : 0.025; }
+  [[nodiscard]] double dock_play() const noexcept {
+    return device_.kinematics == Kinematics::axes ? 3 : 0.025;
+  }
   /// How far the counters of a joint at rest may move from one report to the next.
   [[nodiscard]] int rest_counts() const noexcept { return rest_counts_; }
   /// The farthest that a joint turned from `a` to `b`.
@@ -75,11 +74,23 @@ class DeviceWire {
   void calibrated_at(const EncoderCounts& count) noexcept { dock_count_ = count; }
 
  private:
-  [[nodiscard]] std::optional<ObservedReport> wooden_report(std::span<const std::uint8_t> packet);
+  struct Kind;  ///< what differs between the devices
+  [[nodiscard]] static constexpr std::array<Kind, 6> kinds() noexcept;
+  [[nodiscard]] static const Kind& kind_of(Personality personality) noexcept;
+  using Packet = std::span<const std::uint8_t>;
+  [[nodiscard]] std::optional<ObservedReport> omni_report(Packet packet, bool may_count_anew);
+  [[nodiscard]] std::optional<ObservedReport> falcon_report(Packet packet, bool may_count_anew);
+  [[nodiscard]] std::optional<ObservedReport> wooden_report(Packet packet, bool may_count_anew);
+  [[nodiscard]] std::optional<ObservedReport> cartesian_report(Packet packet, bool may_count_anew);
+  [[nodiscard]] std::optional<ObservedCommand> omni_command(Packet packet);
+  [[nodiscard]] std::optional<ObservedCommand> falcon_command(Packet packet);
+  [[nodiscard]] std::optional<ObservedCommand> wooden_command(Packet packet);
+  [[nodiscard]] std::optional<ObservedCommand> cartesian_command(Packet packet);
   /// Of a device that numbers its packets.
   [[nodiscard]] bool is_newest(std::uint32_t number, bool may_count_anew);
 
-  Personality personality_;
+  const DeviceKind& device_;
+  const Kind& kind_;
   int count_end_ = 0;
   int rest_counts_ = 2;  ///< an encoder that jitters at an edge rests
   EncoderCounts dock_count_{};

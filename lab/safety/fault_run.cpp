@@ -63,7 +63,7 @@ std::unique_ptr<DeviceModel> model_of(const FaultCase& subject, std::uint32_t se
   const DeviceSettings& device = subject.scene.device;
   return with_device_params(device.personality, [&](auto params) {
     take_plant(subject.hand.plant, params);
-    if (device.personality != Personality::woodenhaptics) {
+    if (!kind_of(device.personality).has_watchdog) {
       params.on_silence = seed % 2 == 0 ? OnSilence::hold_torque : OnSilence::drop_torque;
     }
     if constexpr (std::is_same_v<decltype(params), OmniParams>) params.dock_rad = device.dock_rad;
@@ -208,16 +208,14 @@ std::string inconclusive_line(const FaultScript& script, const FaultCase& subjec
 }  // namespace
 
 bool concerns(FaultKind kind, Personality personality, bool by_service) noexcept {
-  const bool is_numbered =
-      personality == Personality::omni || (is_cartesian(personality) && !by_service);
-  if (kind == FaultKind::unhome) {
-    return personality == Personality::falcon || is_cartesian(personality);
-  }
-  if (kind == FaultKind::noise) return personality == Personality::omni;
+  const DeviceKind& device = kind_of(personality);
+  const bool is_numbered = device.streams && !by_service;
+  if (kind == FaultKind::unhome) return device.reports_homed;
+  if (kind == FaultKind::noise) return device.has_pots;
   if (kind == FaultKind::replay) return is_numbered;
   if (is_of_service(kind)) return by_service;
   if (kind == FaultKind::still) return is_cartesian(personality);
-  if (kind == FaultKind::freeze) return personality != Personality::omni;
+  if (kind == FaultKind::freeze) return !device.streams || is_cartesian(personality);
   return true;
 }
 

@@ -40,7 +40,7 @@ struct LoopCase {
   /// weaker make a swing die out that a cool device goes on with.
   bool limits = true;
   // Of the whole arm alone:
-  Personality device = Personality::omni;
+  Personality device{};
   double mode_hz = 0;  ///< structural mode; 0: rigid
 };
 

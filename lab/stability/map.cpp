@@ -195,7 +195,7 @@ std::string impossible(const MapSpec& spec, const LoopCase& subject) {
                   1 / subject.loop.period_s);
   }
   const double rate_hz = 1 / subject.loop.period_s;
-  const bool is_usb = subject.device != Personality::omni;
+  const bool is_usb = !kind_of(subject.device).streams;
   if (spec.arm && is_usb && kUsbFramesPerSecond % std::lround(rate_hz) != 0) {
     return format("rate %g Hz: a USB device has rates that divide 1000 Hz, its frames, such as 500",
                   rate_hz);

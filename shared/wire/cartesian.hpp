@@ -13,43 +13,13 @@
 #include "shared/wire/little_endian.hpp"
 #include "shared/wire/personality.hpp"
 
-// Cartesian devices: they report a pose and take a force. Figures of each, and kerf's own packets.
+// Cartesian devices: they report a pose and take a force. kerf's own packets of them.
 
-/// Figures of a Cartesian device.
-///
-/// Frame of all these devices: x right, y up, z to the user; mm. The code that calls a vendor's
-/// service or library converts the vendor's axes.
 namespace kerf::cartesian {
 
-struct Figures {
-  int step_um;     ///< length of one count in the servo; 16-bit counts cover the workspace
-  int quantum_um;  ///< resolution by the vendor
-  bool has_wrist;  ///< reports an orientation
-  bool has_dock;   ///< is parked in an inkwell only; if false, anywhere, by a button
-  /// Workspace of the data sheet, or a larger one, in the device's frame.
-  std::array<double, 3> low_mm, high_mm;
-  std::array<double, 3> rest_mm;  ///< where the emulated one is parked
-};
-
 /// nullopt for a joint-count device.
-///
-///     Inverse3  510 x 460 x 230 mm, 10 um; origin at inverse3::kOriginM of the service's frame
-///     Touch     55 um; the vendor's origin; in the inkwell all joint angles are 0
-///     omega.3   160 mm in diameter, 110 mm along z, 10 um; the vendor's origin
 [[nodiscard]] constexpr std::optional<Figures> figures(Personality personality) noexcept {
-  switch (personality) {
-    case Personality::inverse3:
-      return Figures{10, 10, true, false, {-230, -255, -115}, {230, 255, 115}, {0, 80, 0}};
-    case Personality::touch:
-      return Figures{10, 55, true, true, {-200, -115, -95}, {200, 200, 95}, {0, -110, -35}};
-    case Personality::omega:
-      return Figures{4, 10, false, false, {-80, -80, -55}, {80, 80, 55}, {0, 50, 0}};
-    case Personality::omni:
-    case Personality::falcon:
-    case Personality::woodenhaptics:
-      break;
-  }
-  return std::nullopt;
+  return kind_of(personality).axes;
 }
 
 /// One motor count of the servo is this force along one axis.

@@ -106,7 +106,7 @@ int Delta::set_force(DeviceVec<double> force_n) noexcept {
   }
   if (enabled_by_force_ && is_force) ledger_.add(Row::before_enable);
   if (most_n >= 0 && wanted_n > most_n) force_n = force_n * (most_n / wanted_n);
-  const double peak_n = force_figures(Personality::omega).peak_n;
+  const double peak_n = force_figures(standin::kDhd.personality).peak_n;
   int result = kOk;
   if (const double length = length_of(force_n); length > peak_n) {
     ledger_.add(Row::excess);
@@ -210,7 +210,7 @@ void Delta::step_regulator(double dt_s) noexcept {
     force_n = (target_mm_ - pose().tip_mm) * kStiffnessNPerMm -
               arm_.velocity(0.005).value_or(DeviceVec<double>{}) * kDampingNsPerMm;
   }
-  const double peak_n = force_figures(Personality::omega).peak_n;
+  const double peak_n = force_figures(standin::kDhd.personality).peak_n;
   const double wanted_n = length_of(force_n);
   arm_.count_command(wanted_n);
   if (wanted_n > peak_n) {

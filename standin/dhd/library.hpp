@@ -23,7 +23,7 @@ int fail(int code) noexcept;
 [[nodiscard]] const char* text_of(int code) noexcept;
 
 struct Library {
-  standin::Session session{"libdrd", Personality::omega};
+  standin::Session session{"libdrd", standin::kDhd.personality};
   std::recursive_mutex mutex;                                    ///< guards the devices
   std::array<std::optional<Delta>, standin::kMostDevices> open;  ///< by ID: the device's number
   std::atomic<bool> is_expert{false};                            ///< of the whole process

@@ -47,13 +47,13 @@ Handle Library::without_device() const noexcept {
 /// there is none.
 standin::Device* Library::device_named(const char* given) noexcept {
   if (!session.has_devices()) return nullptr;
-  const std::string_view name = given != nullptr ? given : standin::kDefaultDevice;
+  const std::string_view name = given != nullptr ? given : standin::kHd.first_name;
   std::string all;
   for (standin::Device& device : session.devices) {
     if (device.settings.name == name) return &device;
     all += ", \"" + device.settings.name + '"';
   }
-  if (name == standin::kDefaultDevice || name == "Default PHANToM") return &session.devices.front();
+  if (name == standin::kHd.first_name || name == "Default PHANToM") return &session.devices.front();
   standin::complain("libHD", std::string(name) + ": no such device; open NULL" + all);
   return nullptr;
 }

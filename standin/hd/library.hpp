@@ -17,7 +17,7 @@ namespace kerf::hd {
 
 /// All state of the library. `mutex` guards the devices; no callback runs while it is held.
 struct Library {
-  standin::Session session{"libHD", Personality::touch};
+  standin::Session session{"libHD", standin::kHd.personality};
   ErrorStack errors;
   std::recursive_mutex mutex;
   std::array<std::optional<Touch>, standin::kMostDevices> open;  ///< by handle

@@ -7,6 +7,7 @@
 
 #include "shared/wire/personality.hpp"
 #include "standin/hd/touch_kinematics.hpp"
+#include "standin/settings.hpp"
 
 /// How warm the motors of the stand-in's Touch are by what they did.
 namespace kerf::hd {
@@ -19,7 +20,8 @@ class MotorHeat {
   /// Maxon RE25, of a PHANTOM Premium: the only one of these arms whose motors are published.
   static constexpr double kWindingS = 12;
   /// The continuous force of the data sheet with the links at right angles: a lever of one link.
-  static constexpr double kContinuousNmm = force_figures(Personality::touch).continuous_n * kLinkMm;
+  static constexpr double kContinuousNmm =
+      force_figures(standin::kHd.personality).continuous_n * kLinkMm;
 
   /// The motors gave this force at the tip for `dt_s`.
   void heat_up(const Angles& joints, DeviceVec<double> force_n, double dt_s) noexcept {

@@ -130,7 +130,7 @@ DeviceVec<double> Touch::wanted_force() noexcept {
 
 DeviceVec<double> Touch::limited(DeviceVec<double> force_n) noexcept {
   const double length = standin::length_of(force_n);
-  const double most_n = force_figures(Personality::touch).peak_n;
+  const double most_n = force_figures(standin::kHd.personality).peak_n;
   if (norm(now_.velocity) > velocity_limit_) {
     ledger_.add(Row::too_fast);
     push(kExceededVelocity);

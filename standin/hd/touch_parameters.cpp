@@ -16,8 +16,8 @@ namespace {
 constexpr unsigned kReal = kFloat | kDouble;
 constexpr unsigned kWhole = kInt | kLong;
 constexpr unsigned kAny = kReal | kWhole;  // clients read these as doubles and as ints
-constexpr auto kFigures = *cartesian::figures(Personality::touch);
-constexpr ForceFigures kForces = force_figures(Personality::touch);
+constexpr auto kFigures = *cartesian::figures(standin::kHd.personality);
+constexpr ForceFigures kForces = force_figures(standin::kHd.personality);
 
 using Out = std::span<double>;
 

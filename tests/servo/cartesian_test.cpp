@@ -12,6 +12,7 @@
 #include <rapidcheck.h>
 
 #include "controller/servo/kinematics.hpp"
+#include "tests/rig/kinematic_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "shared/volume/checksum.hpp"
+#include "tests/rig/kinematic_hand.hpp"
 #include "tests/servo/support.hpp"
 
 /// A scene of two arms, the hands that lead them, and a servo under both.

@@ -145,15 +145,21 @@ counts from there.
 def cartesian(root):
     file = Source(root, "shared/wire/cartesian.hpp")
     number = file.number
-    rows = re.findall(r"case Personality::(\w+):\n\s+return Figures\{(\d+), (\d+), (\w+), (\w+), "
-                      r"\{([-\d, ]+)\}, \{([-\d, ]+)\}, \{([-\d, ]+)\}\}", file.text)
-    forces = dict(re.findall(r"case Personality::(\w+):\n\s+return \{([\d., ]+)\};",
-                             Source(root, "shared/wire/personality.hpp").text))
+    kinds = Source(root, "shared/wire/personality.hpp")
+    rows = []
+    for row in kinds.text.split("DeviceKind{.personality")[1:]:
+        axes = re.search(r"\.axes = \{\{(\d+), (\d+), (\w+), \{([-\d, ]+)\}, \{([-\d, ]+)\}, \{[-\d, ]+\}[^}]*\}\}", row)
+        if axes is None:
+            continue
+        step, quantum, wrist, low, high = axes.groups()
+        forces = re.search(r"\.forces = \{([\d., ]+)\}", row)
+        word = re.search(r'\.word = "(\w+)"', row)[1]
+        rows.append(f"| {word} | {step} | {quantum} | {'yes' if wrist == 'true' else 'no'} "
+                    f"| {'anywhere, by a button' if 'has_dock = false' in row else 'in its inkwell'} "
+                    f"| ({low}) to ({high}) | {forces[1] if forces else '3.3, 0.88, 0.5'} |")
     if len(rows) != 3:
-        raise Lack(f"{file.path}: figures of {len(rows)} devices, not 3; tests/docs/reference has to follow")
-    table = "\n".join(
-        f"| {name} | {step} | {quantum} | {'yes' if wrist == 'true' else 'no'} | {'in its inkwell' if dock == 'true' else 'anywhere, by a button'} "
-        f"| ({low}) to ({high}) | {forces.get(name, '3.3, 0.88, 0.5')} |" for name, step, quantum, wrist, dock, low, high, _ in rows)
+        raise Lack(f"{kinds.path}: figures of {len(rows)} devices, not 3; tests/docs/reference has to follow")
+    table = "\n".join(rows)
     return f"""## Cartesian devices: inverse3, touch, omega
 
 What the vendors' services and libraries say is translated into these packets of kerf's own; the emulator serves them directly

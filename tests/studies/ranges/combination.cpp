@@ -15,8 +15,8 @@
 #include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/volume/file/volume_io.hpp"
-#include "lab/rig/kinematic_arm.hpp"
 #include "tests/rig/geometry.hpp"
+#include "tests/rig/kinematic_hand.hpp"
 #include "tests/studies/ranges/rules.hpp"
 
 namespace kerf::ranges {

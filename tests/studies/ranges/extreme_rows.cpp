@@ -13,10 +13,10 @@
 
 #include "controller/plan/compile.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/kinematic_arm.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/text/text.hpp"
 #include "tests/rig/geometry.hpp"
+#include "tests/rig/kinematic_hand.hpp"
 #include "tests/studies/ranges/combination.hpp"
 #include "tests/studies/ranges/key_study.hpp"
 
