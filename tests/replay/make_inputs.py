@@ -4,9 +4,10 @@
 
 make_inputs.py ROOT BIN
 
-A file of inputs/ has a line for each tick: what came new of `raw`, as a step from the last value, then the
-command, if there was one. Its head has the scene, and its foot the hashes that the run ended in. A change of
-the servo that is meant to change bits changes the hashes alone: take those that the test prints."""
+A file of inputs/ has for each tick one byte, which is the count of numbers of `raw` that changed, plus 64 if the report is
+stale and 128 with a command; then the command and its argument, a byte each; then each change: the index in one byte, and the
+step from the last value, without sign as 2 n or -2 n - 1, seven bits in each byte, the lowest first, plus 128 if more follow.
+The row that is printed belongs into the test. A change of the servo that is meant to change bits changes its hashes alone."""
 import pathlib
 import subprocess
 import sys
@@ -34,17 +35,26 @@ def run(root, programs, folder, scene, hand, seconds, fault):
     return np.load(log / "ticks.npy")
 
 
-def lines_of(log):
-    """stale, steps of the numbers of `raw` that changed as `index:step`, and `command argument` behind a `!`."""
+def bytes_of_step(step):
+    rest = 2 * step if step >= 0 else -2 * step - 1
+    while rest >= 128:
+        yield rest % 128 + 128
+        rest //= 128
+    yield rest
+
+
+def bytes_of(log):
     before = np.zeros(log["raw"].shape[1], dtype=np.int64)
     for row in log:
-        words = ["-"] if row["stale"] else []
         now = row["raw"].astype(np.int64)
-        words += [f"{i}:{now[i] - before[i]}" for i in np.flatnonzero(now != before)]
-        before = now
+        changed = np.flatnonzero(now != before)
+        yield len(changed) + (64 if row["stale"] else 0) + (128 if row["command"] else 0)
         if row["command"]:
-            words += ["!", str(row["command"]), str(row["command_argument"])]
-        yield " ".join(words)
+            yield from (int(row["command"]), int(row["command_argument"]))
+        for i in changed:
+            yield int(i)
+            yield from bytes_of_step(int(now[i] - before[i]))
+        before = now
 
 
 def main():
@@ -52,10 +62,9 @@ def main():
     for name, scene, hand, seconds, fault in RUNS:
         with tempfile.TemporaryDirectory() as folder:
             log = run(root, programs, pathlib.Path(folder), scene, hand, seconds, fault)
-        last = log[-1]
-        text = "\n".join([f"scene {scene}", *lines_of(log), f"output {last['output_hash']:016x}", f"volume {last['volume_hash']:016x}"])
-        (HERE / "inputs" / f"{name}.txt").write_text(text + "\n")
+        (HERE / "inputs" / f"{name}.bin").write_bytes(bytes(bytes_of(log)))
         contact, faults = np.count_nonzero(log["flags"] & 4), sorted(set(log["fault"]) - {0})
+        print(f'{{"{name}", "{scene}", "{log[-1]["output_hash"]:016x}", "{log[-1]["volume_hash"]:016x}"}},')
         print(f"{name}: {len(log)} ticks, {contact} in contact, removed {log['removed'].sum() / 65535:.0f} voxels, faults {faults}")
 
 
