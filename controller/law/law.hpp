@@ -129,15 +129,23 @@ requires LawOf<Law, In>
 }
 
 /// The force of a force law on the hand in N, and the part of it that a spring stores and returns:
-/// all of it, unless the law gives another. The energy ledger books the rest as damping.
+/// all of it, unless the law gives another. The energy ledger books the rest as damping. A law that
+/// cannot give a force returns `failed()`, in all numbers: the fault `force_law`, motors off.
 template <class Real>
 struct LawForce : DeviceVec<Real> {
   DeviceVec<Real> spring_n;
+  bool has_failed = false;
 
   constexpr LawForce(DeviceVec<Real> force_n) noexcept  // NOLINT: a law may return its force alone
       : LawForce(force_n, force_n) {}
   constexpr LawForce(DeviceVec<Real> force_n, DeviceVec<Real> of_spring_n) noexcept
       : DeviceVec<Real>(force_n), spring_n(of_spring_n) {}
+
+  [[nodiscard]] static constexpr LawForce failed() noexcept {
+    LawForce none{DeviceVec<Real>{}};
+    none.has_failed = true;
+    return none;
+  }
 };
 
 /// Input of a force law in one tick of the swept contact. In air the spring and the normal are 0.

@@ -98,6 +98,7 @@ ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
       state.force_law,
       {state.tip_mm, tip_mm, velocity_mm_per_s, spring_mm, relabel<DeviceSpace>(proxy.press)});
   out.contact_n = force;
+  out.law_failed = force.has_failed;
   if (tool.proxy.friction == typename N::Unit{}) {
     out.spring_n = force.spring_n;
   } else {

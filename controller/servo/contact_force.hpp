@@ -30,6 +30,7 @@ struct ContactResult {
   /// cut.
   DeviceVec<Real> modification_n;
   DeviceVec<Real> spring_n, friction_n;        ///< parts of `contact_n`; the rest is damping
+  bool law_failed = false;                     ///< by itself; a force may also be not finite
   std::array<Removed, kMaxVolumes> removed{};  ///< by overlap; by volume of the scene
 
   // Of the proxy:

@@ -233,7 +233,8 @@ ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
   } else {
     contact = contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
   }
-  if (plan.contact.swept && !(all_finite(contact.contact_n) && all_finite(contact.spring_n))) {
+  if (plan.contact.swept &&
+      (contact.law_failed || !all_finite(contact.contact_n) || !all_finite(contact.spring_n))) {
     latch(Fault::force_law, supervisor);
     // What the overlap removed in this tick is gone: it stays counted, and a reset restores it.
     ContactResult<N> kept;

@@ -25,7 +25,7 @@
 //
 // `step` runs in the servo's thread, in each tick that may send a force: no exception, lock, system
 // call, allocation or unbounded loop. In double a value that is not finite latches a fault, motors
-// off; fixed point saturates.
+// off; fixed point saturates. A force law may ask for that fault in both, by `LawForce::failed()`.
 
 #include "controller/law/law.hpp"                    // inputs, settings, registration
 #include "controller/law/registry/law_registry.hpp"  // a law by its name, for tests

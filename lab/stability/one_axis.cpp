@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 
 #include "controller/law/velocity_estimators.hpp"
@@ -43,7 +44,8 @@ class OneAxisWall {
                .thermal_per_tick = {}};
   }
 
-  /// The force on the tip, outwards positive, that a reading of `tip_mm` asks for.
+  /// The force on the tip, outwards positive, that a reading of `tip_mm` asks for; NaN if the law
+  /// failed.
   double force(double reading_mm) noexcept {
     const auto tip_mm = Real(reading_mm);
     const Real moved_mm = tip_mm - last_mm_;
@@ -52,7 +54,11 @@ class OneAxisWall {
     velocity_ = velocity_plan_(velocity_memory_, {along(tip_mm), 1, !velocity_memory_.begun});
     const bool touches = tip_mm < Real(0);
     DeviceVec<Real> wanted_n{};
-    if (law_ == Law::two_sided || touches) wanted_n = wanted(tip_mm);
+    if (law_ == Law::two_sided || touches) {
+      const LawForce<Real> force = wanted(tip_mm);
+      if (force.has_failed) return std::numeric_limits<double>::quiet_NaN();
+      wanted_n = force;
+    }
     sent_n_ = steadied(wanted_n, moved_mm, touches);
     return static_cast<double>(sent_n_.y);
   }
@@ -69,7 +75,7 @@ class OneAxisWall {
     }
   }
 
-  DeviceVec<Real> wanted(Real tip_mm) noexcept {
+  LawForce<Real> wanted(Real tip_mm) noexcept {
     const Real spring_mm = Real(0) - tip_mm;
     if (law_ == Law::coupling)
       return virtual_coupling_force(coupling_, along(spring_mm), velocity_);

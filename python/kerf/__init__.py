@@ -17,8 +17,9 @@ from .interrupted import Interrupted
 from .log import Log, Replay, replay
 from .loop import Loop
 from .scene import Scene
-from .stability import Cell, Map, cell, zwidth
+from .stability import Cell, Map, cell, map_loop, zwidth
 
 __all__ = ["Cell", "Device", "DeviceState", "Error", "Interrupted", "LawInput", "Log", "Loop", "Map", "Phase", "Replay", "ReplayDifference",
            "SampledHand", "SampledLoop", "Scene", "Segment", "SegmentError", "State", "TICK", "Verdict", "__version__", "cell", "device_loop",
-           "highest_damping", "highest_stiffness", "is_stable", "passive_stiffness", "passive_viscosity", "quantum_stiffness", "replay", "zwidth"]
+           "highest_damping", "highest_stiffness", "is_stable", "map_loop", "passive_stiffness", "passive_viscosity", "quantum_stiffness", "replay",
+           "zwidth"]

@@ -40,9 +40,9 @@ def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, **axes):
 
     stiffness: N/mm, "0.05:50:40" (from:to:count, even in the ratio), or numbers. axes: the options of `kerf lab zwidth --help` by
     their names: device, damping (N s/mm), rate (Hz), delay (periods), mass (kg), law, estimator and so on; each a value, a list or
-    array, or "from:to:count". The device may also be one of touch, omega and inverse3, alone: by the figures of
-    kerf.device_loop, which is careful about delay and damping, where the lab takes those of the emulated device. seeds: so many of the
-    encoders' steps against the wall, from `seed` on. seconds: to which a run that is still open is followed, at least. threads: 0
+    array, or "from:to:count". The device is an emulated one, with a delay of one period unless `delay` says otherwise: map_loop has
+    its figures. It may also be one of touch, omega and inverse3, alone. seeds: so many of the encoders' steps against the wall, from
+    `seed` on. seconds: to which a run that is still open is followed, at least. threads: 0
     for all cores; the map is the same. Returns a kerf.Map. Takes seconds to hours (docs/stability.md); Ctrl-C raises
     kerf.Interrupted with the Map of the columns that are done. Raises kerf.Error."""
     axes = _device_by_its_figures(axes)
@@ -56,21 +56,24 @@ def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, **axes):
 
 
 def _device_by_its_figures(axes):
-    """The axis `device` of the lab knows three; the figures of all are in device_loop."""
+    """The axis `device` of the lab knows three arms. A Touch has the Omni's; of the others the lab has to be given what differs."""
     device = axes.get("device")
     if not isinstance(device, str) or "," in device or device in DEVICES_OF_MAPS:
         return axes
-    rates = np.atleast_1d(axes.get("rate", 1000))
-    loop = _kerf.device_loop(device, float(rates[0]) if rates.dtype.kind in "iuf" else 1000)
-    figures = {"mass": loop.mass_kg, "viscous": loop.viscous_ns_per_mm, "friction": loop.coulomb_n, "quantum": loop.quantum_mm,
-               "delay": loop.delay_s / loop.period_s}
+    if device == "touch":
+        return {**axes, "device": "omni"}
+    loop = _kerf.device_loop(device)
+    figures = {"mass": loop.mass_kg, "friction": loop.coulomb_n, "quantum": loop.quantum_mm}
     return {**figures, **{name: value for name, value in axes.items() if name != "device"}}
 
 
-def _loop_of(device, rate_hz):
-    if device in DEVICES_OF_MAPS:
-        return _kerf.column_loop([("device", device), ("rate", _text("rate_hz", rate_hz))])
-    return _kerf.device_loop(device, rate_hz)
+def map_loop(device, rate_hz=1000.0):
+    """The kerf.SampledLoop that zwidth and cell have for a device: of the emulated arm, with a delay of one period.
+
+    kerf.highest_stiffness(map_loop(device), damping) is the linear boundary of that map. kerf.device_loop is for a unit: with the
+    2 ms of its bus, which are assumed until somebody measures them, and the least damping. rate_hz: of the servo. Raises kerf.Error."""
+    axes = _device_by_its_figures({"device": device, "rate": rate_hz})
+    return _kerf.column_loop([(name, _text(name, value)) for name, value in axes.items()])
 
 
 def _text(name, values):
@@ -128,7 +131,7 @@ def cell(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=10
          seed=1, law="coupling", estimator="foaw", numeric="fixed", limits=True):
     """One run of a cell of a map, with what moved: a hand meets a wall at `hit_mm_per_s` and goes on pushing.
 
-    stiffness_n_per_mm, damping_ns_per_mm: of the wall, N/mm and N s/mm. device, rate_hz: whose loop, as in zwidth, unless `loop`, a
+    stiffness_n_per_mm, damping_ns_per_mm: of the wall, N/mm and N s/mm. device, rate_hz: whose loop, map_loop, unless `loop`, a
     kerf.SampledLoop, is given. push_n: of the hand, above Coulomb friction, N. seconds: to which a run that is still open is followed. seed: shifts the
     encoder's steps against the wall; 0: one lies on it. In a map, seed s and hit number h (0, 50, 200 mm/s) have s * 2**32 + h. law:
     "coupling", "linear", "two_sided", the name of a law, or a function as of Loop.law, which gets the stiffness and damping, too.
@@ -137,7 +140,7 @@ def cell(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=10
     if numeric not in ("fixed", "double"):
         raise _kerf.Error(f"numeric: {numeric!r}; give fixed or double")
     run = _kerf.WallRun()
-    run.loop = loop if loop is not None else _loop_of(device, rate_hz)
+    run.loop = loop if loop is not None else map_loop(device, rate_hz)
     run.stiffness_n_per_mm, run.damping_ns_per_mm = stiffness_n_per_mm, damping_ns_per_mm
     run.push_n, run.hit_mm_per_s, run.seconds, run.seed = push_n, hit_mm_per_s, seconds, seed
     run.estimator, run.fixed_point, run.limits = estimator, numeric == "fixed", limits

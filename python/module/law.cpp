@@ -2,7 +2,6 @@
 #include "python/module/law.hpp"
 
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <pybind11/numpy.h>
@@ -110,7 +109,7 @@ class PythonLaw {
       : stiffness_n_per_mm_(setup["stiffness_n_per_mm"]),
         damping_ns_per_mm_(setup["damping_ns_per_mm"]) {}
 
-  DeviceVec<Real> step(const ForceInput<N>& in, State&) const noexcept {
+  LawForce<Real> step(const ForceInput<N>& in, State&) const noexcept {
     const auto doubles = [](const auto& v) {
       return std::array{static_cast<double>(v.x), static_cast<double>(v.y),
                         static_cast<double>(v.z)};
@@ -121,10 +120,9 @@ class PythonLaw {
                                doubles(in.velocity_mm_per_s), doubles(in.spring_mm),
                                doubles(in.normal), stiffness_n_per_mm_, damping_ns_per_mm_});
     }
-    // Fixed numbers have no NaN: it becomes 0.
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    const auto& [x, y, z] = force_n.value_or(std::array{kNone, kNone, kNone});
-    return {Real(x), Real(y), Real(z)};
+    if (!force_n) return LawForce<Real>::failed();
+    const auto& [x, y, z] = *force_n;
+    return DeviceVec<Real>{Real(x), Real(y), Real(z)};
   }
 
  private:

@@ -25,9 +25,9 @@ struct LawValues {
 ///
 /// The servo finds it through the thread, since a law in a plan is plain bytes: a `LawInUse` puts
 /// it there. The first call that raises, or returns something else than three finite numbers, is
-/// the last one: from that tick on the law asks for no force, and in double, where it can, for a
-/// fault that switches the motors off. Ctrl-C in the function calls it a second time, so that a run
-/// can go on after it; the second one in a row ends the function as any other exception does.
+/// the last one: from that tick on the law fails, and the servo latches its fault, motors off.
+/// Ctrl-C in the function calls it a second time, so that a run can go on after it; the second one
+/// in a row ends the function as any other exception does.
 class __attribute__((visibility("hidden"))) LawFunction {
  public:
   explicit LawFunction(pybind11::function function) : function_(std::move(function)) {}

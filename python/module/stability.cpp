@@ -115,8 +115,10 @@ void define_stability(py::module_& module) {
       .def_readwrite("hand", &SampledLoop::hand)
       .def_readwrite("coulomb_n", &SampledLoop::coulomb_n, "Coulomb friction at the tip, N")
       .def_readwrite("quantum_mm", &SampledLoop::quantum_mm, "of the encoders, at the tip");
-  module.def("device_loop", &device_loop, py::arg("device"), py::arg("rate_hz") = 1000.0,
-             "The SampledLoop of a device by the figures of docs/devices.md, without a hand.");
+  module.def(
+      "device_loop", &device_loop, py::arg("device"), py::arg("rate_hz") = 1000.0,
+      "The SampledLoop of a unit of a device by the figures of docs/devices.md, without a "
+      "hand: with the assumed delay of 2 ms of its bus. map_loop is that of the emulated one.");
 
   const auto sound = [](const SampledLoop& loop) {
     if (const std::string problem = problem_in(loop); !problem.empty()) throw Error(problem);

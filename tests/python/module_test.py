@@ -230,9 +230,8 @@ class TestLaws(Case):
                 self.assertEqual(len(loop.ticks), loop.tick)
                 self.assertEqual(f"law, tick {loop.tick}", str(error).split(":")[0])
                 self.assertFalse(loop.last["commanded_force_n"].any())
-                if numeric == "double":
-                    self.assertEqual(loop.last["fault"], 4)
-                    self.assertFalse(loop.last["dac_counts"].any() and loop.last["flags"] & (1 << 7))
+                self.assertEqual(loop.last["fault"], 4)
+                self.assertFalse(loop.last["dac_counts"].any() or loop.last["flags"] & (1 << 7))
                 self.refused(words, loop.run, ticks=1)
                 self.refused(words, loop.step)
                 loop.law = spring
@@ -332,6 +331,8 @@ class TestMaps(Case):
         for device in ("omega", "touch", "inverse3"):
             made = kerf.zwidth(device=device, stiffness=[0.5, 30], damping=0.002, seeds=1, seconds=1)
             self.assertTrue(made.rests[..., 0].all() or made.swings.any(), device)
+            self.assertEqual((kerf.map_loop(device).delay_s, kerf.map_loop(device, 4000).delay_s), (0.001, 0.00025))
+            self.assertEqual(kerf.device_loop(device, 4000).delay_s, 0.002)
         loop = kerf.device_loop("omega")
         self.assertTrue(kerf.is_stable(loop, 0.5 * kerf.highest_stiffness(loop, 0.002), 0.002))
         loop.mass_kg = -1

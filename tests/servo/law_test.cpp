@@ -36,7 +36,8 @@ std::array<double, 3> doubles(V v) {
   return {double(v.x), double(v.y), double(v.z)};
 }
 
-/// The spring alone, stiff as it is told; 0: nothing but NaN.
+/// The spring alone, stiff as it is told; 0: nothing but NaN, and in fixed point, which has none,
+/// nothing but a failure.
 template <class N>
 class PlainSpring {
  public:
@@ -47,15 +48,17 @@ class PlainSpring {
     std::uint32_t age = 0;
   };
   explicit PlainSpring(const LawSetup& setup) : k_(typename N::Ratio(setup["k"])) {}
-  DeviceVec<typename N::Real> step(const ForceInput<N>& in, State& state) const noexcept {
+  LawForce<typename N::Real> step(const ForceInput<N>& in, State& state) const noexcept {
     using Real = typename N::Real;
     seen.spring_mm = doubles(in.spring_mm);
     seen.normal = doubles(in.normal);
     seen.age = ++state.age;
-    if (!(k_ > typename N::Ratio(0)))
-      return {Real(std::numeric_limits<double>::quiet_NaN()), {}, {}};
-    return {multiply<Real>(k_, in.spring_mm.x), multiply<Real>(k_, in.spring_mm.y),
-            multiply<Real>(k_, in.spring_mm.z)};
+    if (!(k_ > typename N::Ratio(0))) {
+      if constexpr (N::kIsFixed) return LawForce<Real>::failed();
+      return DeviceVec<Real>{Real(std::numeric_limits<double>::quiet_NaN()), {}, {}};
+    }
+    return DeviceVec<Real>{multiply<Real>(k_, in.spring_mm.x), multiply<Real>(k_, in.spring_mm.y),
+                           multiply<Real>(k_, in.spring_mm.z)};
   }
 
  private:
@@ -190,9 +193,10 @@ TEST_CASE("a spring as a law of its own is the coupling without its damper, bit 
 TEST_CASE(
     "a law that gives no number: motors off in that tick, its kind latched, parking clears it") {
   LoadedScene force = with_force_law(NumericKind::float64, 0),
+              fixed_force = with_force_law(NumericKind::fixed, 0),
               stabiliser = with_stabiliser(NumericKind::float64, 0, 1);
-  for (auto* scene : {&force, &stabiliser}) {
-    const Fault fault = scene == &force ? Fault::force_law : Fault::stabiliser;
+  for (auto* scene : {&force, &fixed_force, &stabiliser}) {
+    const Fault fault = scene == &stabiliser ? Fault::stabiliser : Fault::force_law;
     auto servo = compile(*scene);
     KinematicOmni arm;
     for (int round = 0; round < 2; ++round) {
