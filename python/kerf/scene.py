@@ -2,7 +2,6 @@
 import json
 import os
 import pathlib
-import sys
 
 import numpy as np
 
@@ -37,8 +36,9 @@ def settings_of(tables):
 
 def shipped(name, folder=""):
     """The file of that name; else that of the scenes that come with kerf, also without its ending. A name that is none stays."""
-    here = pathlib.Path(__file__).resolve().parent  # of a clone, of the wheel, or installed
-    scenes = [here.parents[1] / "scenes", here / "scenes", pathlib.Path(sys.prefix, "share/kerf/scenes"), pathlib.Path("/usr/share/kerf/scenes")]
+    here = pathlib.Path(__file__).resolve().parent
+    clone, prefix = here.parent.parent, here.parent.parent.parent.parent
+    scenes = [clone / "scenes", here / "scenes", prefix / "share/kerf/scenes"]  # the second ones are of the wheel
     name = os.fspath(name)
     for path in [pathlib.Path(name), *(root / folder / (name + ending) for root in scenes for ending in ("", ".toml"))]:
         if path.is_file():

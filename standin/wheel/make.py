@@ -4,23 +4,17 @@
 
     python3 standin/wheel/make.py VERSION LIBRARIES EMULATOR OUT
 
-By the format of the Python packaging user guide ("Binary distribution format"), with Python's own zipfile, so that it
-needs no network. Its platform follows from the symbol versions that its files ask of glibc. The same files give the same
-bytes: each entry has the time of SOURCE_DATE_EPOCH, or of the last commit, or of 1980."""
-import base64
-import hashlib
-import os
+Its platform follows from the symbol versions that its files ask of glibc. cmake/wheel_file.py writes it."""
 import pathlib
 import platform
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
-import time
-import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "cmake"))
+from wheel_file import Refusal, stripped, write  # noqa: E402
+
 NAME = "kerf_standin"
 # Each system with glibc has these, from that package alone; any other library would be a stranger's to install.
 OF_GLIBC = re.compile(r"(libc|libm|libpthread|libdl|librt)\.so\.\d+|ld-linux[-_.a-z0-9]*\.so\.\d+")
@@ -38,10 +32,6 @@ Description-Content-Type: text/markdown
 {page}"""
 
 
-class Refusal(Exception):
-    """One line: what is wrong, and what to do."""
-
-
 def asked_of_glibc(path):
     """The newest glibc that a program or library needs, as (2, 34)."""
     def printed(*options):
@@ -51,24 +41,6 @@ def asked_of_glibc(path):
             raise Refusal(f"{path}: needs {library}, which no wheel may ask for; link it statically")
     return max((tuple(map(int, version.split("."))) for version in re.findall(r"Name: GLIBC_([0-9.]+)", printed("-VW"))),
                default=(2, 17))[:2]
-
-
-def entry_time():
-    """(year, month, day, hour, minute, second) of every entry; a zip has the years from 1980 to 2107."""
-    seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if not seconds and shutil.which("git"):
-        command = ["git", "-C", ROOT, "log", "-1", "--format=%ct"]
-        seconds = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
-    if not re.fullmatch(r"[0-9]{0,11}", seconds):
-        raise Refusal(f"SOURCE_DATE_EPOCH={seconds}: not a number of seconds; unset it, or take 1700000000")
-    return min(max((1980, 1, 1, 0, 0, 0), time.gmtime(int(seconds or "0"))[:6]), (2107, 12, 31, 23, 59, 58))
-
-
-def stripped(path):
-    with tempfile.TemporaryDirectory() as folder:
-        out = pathlib.Path(folder, "stripped")
-        subprocess.run(["strip", "--strip-unneeded", "-o", out, path], check=True)
-        return out.read_bytes()
 
 
 def files_of(libraries, emulator):
@@ -91,28 +63,12 @@ def make(version, libraries, emulator, out):
     content, binaries = files_of(libraries, emulator)
     glibc = max(map(asked_of_glibc, binaries.values()))
     tag = f"py3-none-manylinux_{glibc[0]}_{glibc[1]}_{platform.machine()}"
-    info = f"{NAME}-{version}.dist-info"
     page = (ROOT / "docs/stand-ins.md").read_text(encoding="utf-8")
-    entries = {f"{NAME}/{name}": data for name, data in sorted(content.items())} | {
-        f"{info}/METADATA": METADATA.format(version=version, page=page).encode(),
-        f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: kerf\nRoot-Is-Purelib: false\nTag: {tag}\n".encode(),
-        f"{info}/entry_points.txt": f"[console_scripts]\nkerf-standin = {NAME}:exit_with_main\n".encode(),
-        f"{info}/LICENSE": (ROOT / "LICENSE").read_bytes()}
-    record = [f"{name},sha256={base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b'=').decode()},{len(data)}\n"
-              for name, data in entries.items()]
-    entries[f"{info}/RECORD"] = "".join([*record, f"{info}/RECORD,,\n"]).encode()
-    out.mkdir(parents=True, exist_ok=True)
-    wheel, part, when = out / f"{NAME}-{version}-{tag}.whl", out / f"{NAME}.part", entry_time()
-    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file:
-        for name, data in entries.items():
-            entry = zipfile.ZipInfo(name, when)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.create_system = 3  # Unix: the rights below
-            entry.external_attr = (0o100755 if name.removeprefix(NAME + "/") in binaries else 0o100644) << 16
-            file.writestr(entry, data)
-    for older in out.glob(f"{NAME}-*.whl"):
-        older.unlink()
-    part.rename(wheel)
+    files = {f"{NAME}/{name}": data for name, data in content.items()}
+    info = {"METADATA": METADATA.format(version=version, page=page).encode(),
+            "entry_points.txt": f"[console_scripts]\nkerf-standin = {NAME}:exit_with_main\n".encode(),
+            "LICENSE": (ROOT / "LICENSE").read_bytes()}
+    wheel = write(out, NAME, version, tag, files, {f"{NAME}/{name}" for name in binaries}, info)
     if glibc > EVERYWHERE:
         print(f"wheel: {wheel.name}: asks for glibc {glibc[0]}.{glibc[1]}, which Debian 12 and Ubuntu 22.04 do not have; "
               "standin/wheel/Containerfile makes one for them", file=sys.stderr)
