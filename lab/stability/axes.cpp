@@ -26,7 +26,8 @@ constexpr std::array<AxisKind, kAxisCount> kKinds{{
      "encoder "
      "steps or limits); kerf: the servo as it is. Sets what is not given"},
     {"device", "", "omni", 0, 0, "omni falcon woodenhaptics",
-     "mass, friction and encoder of the emulated one. Sets what is not given"},
+     "mass, friction and encoder of the emulated one, or of a file of kerf identify "
+     "(device.toml), with its delay. Sets what is not given"},
     {"damping", "N s/mm", "0.002", 0, 2, "", "of the wall, B"},
     {"rate", "Hz", "1000", 250, 32000, "", "of the servo"},
     {"delay", "periods", "1", 0, 64, "", "from reading to force, any part of a period"},

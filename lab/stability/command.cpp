@@ -22,6 +22,7 @@
 #include "lab/run/lab_run.hpp"
 #include "lab/stability/arm.hpp"
 #include "lab/stability/axes.hpp"
+#include "lab/stability/device_file.hpp"
 #include "lab/stability/map.hpp"
 #include "lab/stability/map_file.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -137,7 +138,9 @@ class Command final : public LabCommand {
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
-  [[nodiscard]] MapSpec spec() const;
+  [[nodiscard]] MapSpec spec(std::ostream& out) const;
+  /// The axes as given; of a file behind --device its own values for those that are not.
+  [[nodiscard]] std::array<std::string, kAxisCount> axis_texts(std::ostream& out) const;
   static void try_laws(const MapSpec& map, std::ostream& out);
   [[nodiscard]] Shard shard() const;
   /// The columns of the shard that `kept` has not; false: interrupted.
@@ -149,7 +152,7 @@ class Command final : public LabCommand {
   int merge(std::ostream& out) const;
 
   std::array<std::string, kAxisCount> axes_, option_names_;
-  std::string stiffness_, map_ = kMapped, shard_ = "1/1", part_, portraits_, page_;
+  std::string stiffness_, map_ = kMapped, shard_ = "1/1", part_, portraits_, page_, direction_;
   std::vector<std::string> cells_, merge_;
   OutputPaths paths_;
   bool quick_ = false, arm_ = false;
@@ -169,6 +172,10 @@ Command::Command(Arguments& program)
     app_.option(option_names_[i].c_str(), axes_[i], meaning)
         .shown_as(*kind.unit != 0 ? kind.unit : "VALUE");
   }
+  app_.option("--direction", direction_,
+              "of a --device that is a file of kerf identify: x, y, z, such as 1,0,1, or worst "
+              "[worst]")
+      .shown_as("N");
   app_.option("--stiffness", stiffness_,
               "of the wall, K: from:to:count, even in their ratio [0.05:50:40]")
       .shown_as("N/mm");
@@ -308,11 +315,37 @@ void check_filters(const MapSpec& spec) {
   }
 }
 
-MapSpec Command::spec() const {
+std::array<std::string, kAxisCount> Command::axis_texts(std::ostream& out) const {
+  std::array<std::string, kAxisCount> texts = axes_;
+  std::string& device = texts[index_of(AxisId::device)];
+  if (!device.ends_with(".toml")) {
+    if (direction_.empty() && device.find(".toml") == std::string::npos) return texts;
+    if (direction_.empty()) throw HilError("--device: " + device + ": give one file alone");
+    throw HilError(
+        "--direction: is that of a file behind --device; give such as --device "
+        "device.toml, or leave it out");
+  }
+  if (device.find(',') != std::string::npos) {
+    throw HilError("--device: " + device + ": give one file alone");
+  }
+  if (arm_) {
+    throw HilError("--device: " + device +
+                   ": the whole arm is an emulated one; leave --arm out, or name its device");
+  }
+  const DeviceDirection found =
+      take_device(device, direction_.empty() ? "worst" : direction_, texts);
+  out << format("%s along %.3g, %.3g, %.3g: %.4g kg, %.4g N s/mm, friction %.4g N\n",
+                device.c_str(), found.along[0], found.along[1], found.along[2], found.mass_kg,
+                found.viscous_ns_per_mm, found.coulomb_n);
+  device.clear();
+  return texts;
+}
+
+MapSpec Command::spec(std::ostream& out) const {
   MapSpec spec;
   spec.mapped = mapped_axes(map_);
   spec.arm = arm_;
-  std::array<std::string, kAxisCount> texts = axes_;
+  std::array<std::string, kAxisCount> texts = axis_texts(out);
   for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
     if (!arm_ || texts[index_of(axis)].empty()) continue;
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
@@ -440,7 +473,7 @@ bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
 bool Command::chooses_map() const {
   return std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); }) ||
          map_ != kMapped || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
-         seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1";
+         seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1" || !direction_.empty();
 }
 
 int Command::merge(std::ostream& out) const {
@@ -473,7 +506,7 @@ int Command::run(std::ostream& out) const {
   if (!cells_.empty() && portraits_.empty()) {
     throw HilError("--cells: are those of portraits; add --portraits FILE, or leave them out");
   }
-  const MapSpec map = spec();
+  const MapSpec map = spec(out);
   const Shard part = shard();
   check_columns(map);
   std::vector<std::string> kept_in;

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/stability/device_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "hil/hil_error.hpp"
+#include "shared/text/text.hpp"
+#include "tests/lab/lab_line.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace {
+
+using kerf::test::lab;
+using kerf::test::LabAnswer;
+using kerf::test::TemporaryFolder;
+using kerf::test::text_of;
+using kerf::zwidth::along;
+using kerf::zwidth::direction_of;
+using kerf::zwidth::IdentifiedDevice;
+using kerf::zwidth::read_device;
+
+const std::string kWhole =
+    "[device]\nmass_kg = [0.032, 0.053, 0.077, 0.01, -0.022, 0.005]\n"
+    "viscous_ns_per_mm = [0.0004, 0.0005, 0.0006]\ncoulomb_n = [0.1, 0.2, 0.3]\n"
+    "quantum_mm = [0.03, 0.03, 0.04]\ndelay_s = 0.0018\nrate_hz = 1000\n[low]\n[high]\n[fit]\n";
+
+std::string refusal_of(const std::string& file) {
+  try {
+    static_cast<void>(read_device(file));
+  } catch (const kerf::HilError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("an identified device has in each direction the mass that a wall there moves") {
+  const TemporaryFolder folder;
+  const IdentifiedDevice device = read_device(folder.write("device.toml", kWhole));
+  CHECK(device.mass_kg[0][2] == -0.022);
+  CHECK(device.mass_kg[2][0] == -0.022);
+  CHECK(device.delay_s == 0.0018);
+  // A force of 1 N along n alone: the acceleration along n is n' M^-1 n, by elimination.
+  const auto& m = device.mass_kg;
+  const double yy = m[1][1] - m[0][1] * m[0][1] / m[0][0];
+  const double yz = m[1][2] - m[0][1] * m[0][2] / m[0][0];
+  const double zz = m[2][2] - m[0][2] * m[0][2] / m[0][0];
+  const auto z = along(device, {0, 0, -3});
+  CHECK(z.mass_kg == doctest::Approx(zz - yz * yz / yy).epsilon(1e-12));
+  CHECK(z.viscous_ns_per_mm == doctest::Approx(0.0006));
+  CHECK(z.coulomb_n == doctest::Approx(0.3));
+  CHECK(z.quantum_mm == doctest::Approx(0.04));
+  const auto slanted = along(device, {1, 1, 0});
+  CHECK(slanted.viscous_ns_per_mm == doctest::Approx(0.00045));
+  CHECK(slanted.coulomb_n == doctest::Approx(0.3 / std::sqrt(2.0)));
+  // Heavier along x than what is left when y and z are free.
+  CHECK(along(device, {1, 0, 0}).mass_kg < m[0][0]);
+  CHECK(direction_of(device, "y", 0.002, 1000).along[1] == 1);
+  CHECK(direction_of(device, "0,2,0", 0.002, 1000).mass_kg ==
+        direction_of(device, "y", 0.002, 1000).mass_kg);
+}
+
+TEST_CASE("the worst direction has the lowest boundary of all that are tried") {
+  const TemporaryFolder folder;
+  const IdentifiedDevice device = read_device(folder.write("device.toml", kWhole));
+  const auto boundary = [&](const kerf::zwidth::DeviceDirection& at) {
+    kerf::SampledLoop loop;
+    loop.mass_kg = at.mass_kg;
+    loop.viscous_ns_per_mm = at.viscous_ns_per_mm;
+    loop.delay_s = device.delay_s;
+    return kerf::highest_stiffness(loop, 0.002);
+  };
+  const double worst = boundary(direction_of(device, "worst", 0.002, 1000));
+  CHECK(worst > 0);
+  for (const char* other : {"x", "y", "z", "1,1,0", "1,0,-1", "1,-1,1"}) {
+    CHECK(worst <= boundary(direction_of(device, other, 0.002, 1000)));
+  }
+}
+
+TEST_CASE("a map of a file is that of its figures as options") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("device.toml", kWhole);
+  const auto z = along(read_device(file), {0, 0, 1});
+  const std::string map = "zwidth --damping 0,0.002 --stiffness 0.5:5:4 --seeds 1 --csv ";
+  const LabAnswer by_file =
+      lab(map + (folder / "file.csv").string() + " --direction z --device " + file);
+  CHECK(by_file.err.empty());
+  CHECK(by_file.code == 0);
+  CHECK(by_file.out.starts_with(file + " along 0, 0, 1: "));
+  const std::string figures = kerf::format(
+      " --mass %.6g --viscous 0.0006 --friction 0.3 --quantum 0.04 --delay 1.8", z.mass_kg);
+  CHECK(lab(map + (folder / "figures.csv").string() + figures).code == 0);
+  CHECK(text_of(folder / "file.csv") == text_of(folder / "figures.csv"));
+}
+
+TEST_CASE("a file that is no device, and options against it, get one line") {
+  const TemporaryFolder folder;
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = kWhole;
+    text.replace(text.find(from), from.size(), to);
+    return refusal_of(folder.write("device.toml", text));
+  };
+  CHECK(with("[device]", "[devices]").find("no table [device]") != std::string::npos);
+  CHECK(with("mass_kg = [0.032", "# mass_kg = [0.032").find("has no mass_kg") != std::string::npos);
+  CHECK(with("0.032, 0.053", "0.032, -0.053").find("not positive in each direction") !=
+        std::string::npos);
+  CHECK(with("0.0004, ", "").find("a list of 2; write 3 numbers") != std::string::npos);
+  CHECK(with("0.1, 0.2", "0.1, -0.2").find("out of range") != std::string::npos);
+  CHECK(with("0.0018", "nan").find("out of range") != std::string::npos);
+  CHECK(with("rate_hz", "rate").find("unknown key") != std::string::npos);
+
+  const std::string file = folder.write("device.toml", kWhole);
+  for (const auto& [words, line] :
+       {std::pair{"--direction z", "--direction: is that of a file"},
+        std::pair{"--direction 0,0,0 --device FILE", "--direction: 0,0,0: no direction"},
+        std::pair{"--direction up --device FILE", "--direction: up: no direction"},
+        std::pair{"--arm --device FILE", "leave --arm out"},
+        std::pair{"--rate 500,1000 --device FILE", "the map has one rate"},
+        std::pair{"--device omni,FILE", "one file alone"}}) {
+    std::string text = words;
+    if (const auto at = text.find("FILE"); at != std::string::npos) text.replace(at, 4, file);
+    const LabAnswer answer = lab("zwidth --quick " + text);
+    CAPTURE(answer.err);
+    CHECK(answer.code == 2);
+    CHECK(std::ranges::count(answer.err, '\n') == 1);
+    CHECK(answer.err.find(line) != std::string::npos);
+  }
+}
