@@ -95,7 +95,7 @@ install(DIRECTORY ${completion}/ DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-compl
 set(share ${CMAKE_INSTALL_DATADIR}/kerf)
 install(PROGRAMS kerf DESTINATION ${share})
 install(DIRECTORY cli DESTINATION ${share} PATTERN kerf-studies.txt EXCLUDE PATTERN kerf-visualizer-monkey.txt EXCLUDE)
-install(DIRECTORY demo DESTINATION ${share} PATTERN __pycache__ EXCLUDE)
+install(DIRECTORY demo identify DESTINATION ${share} PATTERN __pycache__ EXCLUDE)
 install(PROGRAMS .ci/doctor.sh DESTINATION ${share}/.ci)
 install(CODE "file(CREATE_LINK ../${share}/kerf
   \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/kerf\" SYMBOLIC)")

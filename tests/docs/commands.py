@@ -30,7 +30,7 @@ def help_of(*command):
 
 def known_options(words):
     """Options of `./kerf WORDS...`: those of kerf itself, or of a program and its subcommand."""
-    if words[0] in ("demo", "test", "bench", "completion", "doctor", "setup", "docs", "page", "package", "sweep", "stand-in"):
+    if words[0] in ("demo", "test", "bench", "completion", "doctor", "setup", "docs", "page", "package", "sweep", "stand-in", "identify"):
         text = help_of(root / "kerf", words[0]) + (help_of(bin_folder / "kerf-lab", "sweep") if words[0] == "sweep" else "")
         text += help_of(bin_folder / "kerf-studies", "ranges") + help_of(bin_folder / "kerf-lab", "faults")
         text += help_of(bin_folder / "kerf-lab", "bench") + help_of(bin_folder / "kerf-visualizer")

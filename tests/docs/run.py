@@ -61,7 +61,8 @@ NOT_HERE = {
     "names a program or an option, and is no whole command": [
         "./kerf controller$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
         "./kerf controller --rate HZ$", "./kerf controller --port udp:HOST:5000$", "./kerf controller --report FILE$",
-        "./kerf controller --explain --report FILE$", "./kerf record info LOG", "./kerf replay$"],
+        "./kerf controller --explain --report FILE$", "./kerf record info LOG", "./kerf replay$", "./kerf identify$"],
+    "needs a recording of a device that a program has moved; the tests identify and lab run it": ["identify.md: "],
     "runs a program of the reader's own": ["./kerf stand-in --device touch --vendor-name Left"],
 }
 # What stands for a reader's own file, within text.

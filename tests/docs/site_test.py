@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 root = pathlib.Path(sys.argv[1]).resolve()
-sys.path.insert(0, str(root / "tests" / "web"))
+sys.path.insert(0, str(root / "tests" / "page"))
 import browser
 import pages
 

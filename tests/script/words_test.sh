@@ -160,7 +160,7 @@ offers() {
   [[ $(tr ' ' '\n' <<<"$offered" | LC_ALL=C sort | paste -sd ' ') == "$wanted" ]]
 }
 rm -f "$lab/calls"
-all='arm bench bridge completion controller demo docs doctor emulator lab package page record recorder replay setup stand-in sweep test visualizer volume'
+all='arm bench bridge completion controller demo docs doctor emulator identify lab package page record recorder replay setup stand-in sweep test visualizer volume'
 expect 'Tab offers commands and programs' offers "$all" ''
 expect 'and behind help' offers "$all" help ''
 expect 'or those that begin so' offers 'docs doctor' 'do'

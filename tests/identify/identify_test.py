@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator of `./kerf identify` on emulated arms whose values it never gets, and on logs that are wrong.
+
+    identify_test.py ROOT LIBRARY          the library is arm.cpp beside it"""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import numpy as np
+except ImportError:
+    print("skipped: python3 has no numpy")
+    sys.exit(77)
+
+ROOT, LIBRARY = sys.argv.pop(1), sys.argv.pop(1)
+sys.path[:0] = [f"{ROOT}/identify", f"{ROOT}/python", str(pathlib.Path(__file__).parent)]
+import arms as emulated
+import boundary
+import device_file
+import estimate
+import log_motion
+import study
+from experiment import SECONDS, Experiment
+from kerf_reader.tick import TICK
+from weak_form import Rows
+
+LIB = emulated.library(LIBRARY)
+
+
+def motion_of(places, forces, n):
+    return estimate.Motion(emulated.PERIOD_S, places[:, n].copy(), forces[:, n].copy(), np.ones(len(places), bool))
+
+
+class TestRows(unittest.TestCase):
+    def test_rows_of_a_parabola_and_of_a_held_force_are_exact(self):
+        count, t = 300, 0.001
+        rows = Rows(40, count, t, 8)
+        seconds = np.arange(count) * t
+        self.assertLess(np.abs(rows.of(3.0 * seconds**2, 2) - 6.0).max(), 1e-6)
+        self.assertLess(np.abs(rows.of(3.0 * seconds**2, 1) - 6.0 * seconds[rows.centre]).max(), 1e-9)
+        force = np.random.default_rng(1).normal(size=count)
+        for delay in (0.0, 1.3, 3.75):
+            # A hundred points of each period, by the midpoint rule.
+            fine = (np.arange(count * 100) + 0.5) / 100
+            held = force[np.clip(np.floor(fine - delay).astype(int), 0, count - 1)]
+            centre = rows.centre[3]
+            u = (fine - centre) / 40
+            bump = np.where(np.abs(u) < 1, np.clip(1 - u**2, 0, 1)**8, 0)
+            self.assertAlmostEqual(rows.of_force(force, delay)[3], held @ bump / bump.sum(), places=5)
+            step = 1e-5
+            slope = (rows.of_force(force, delay + step) - rows.of_force(force, delay - step)) / (2 * step)
+            self.assertLess(np.abs(slope - rows.of_force(force, delay, by_delay=True)).max(), 1e-6)
+
+    def test_the_quantum_is_the_common_step(self):
+        true = np.cumsum(np.random.default_rng(2).normal(size=5000)) * 3e-5
+        for step in (2e-6, 5.5e-5):
+            self.assertAlmostEqual(estimate.quantum_of(np.floor(true / step) * step) / step, 1.0, places=6)
+
+
+class TestArms(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        # Of the study's: little friction, a mode with coarse encoders, 1.4 kg, and 10 g with 0.6 N of friction.
+        cls.arms = emulated.draw(29, 1)[[4, 5, 6, 28]]
+        experiment = Experiment(np.full(len(cls.arms), emulated.LIMIT_N))
+        cls.places, cls.forces = emulated.run(LIB, cls.arms, experiment, SECONDS)
+
+    def test_hidden_values_are_found_within_their_intervals(self):
+        for n in range(3):
+            arm, found = self.arms[n], estimate.estimate(motion_of(self.places, self.forces, n))
+            truth = study.truth_of(arm)
+            claimed = [i for i, name in enumerate(estimate.NAMES) if not name.startswith("spring")]
+            inside = (found.low <= truth) & (truth <= found.high)
+            self.assertGreaterEqual(np.count_nonzero(inside[claimed]), len(claimed) - 1, [n, found.low, truth, found.high])
+            self.assertLess(np.abs(found.values[:3] / truth[:3] - 1).max(), 0.03)
+            self.assertLess(np.abs(found.values[6:9] / truth[6:9] - 1).max(), 0.10)
+            self.assertLess(np.abs(found.values[9:12] / truth[9:12] - 1).max(), 0.05)
+            self.assertLess(abs(found.values[18] - truth[18]), 0.1)
+            self.assertLess(np.abs(found.quantum_m / arm["quantum"] - 1).max(), 0.01)
+            self.assertEqual(found.mode is not None, arm["mode"] > 0)
+            if found.mode:
+                self.assertLess(abs(found.mode.hz * 2 * np.pi / arm["mode"] - 1), 0.02)
+            self.assertEqual((found.moved, found.spoilt), (["x", "y", "z"], []))
+
+    def test_an_arm_whose_friction_takes_the_force_is_refused(self):
+        with self.assertRaisesRegex(estimate.NoEstimate, "friction may take most of it"):
+            estimate.estimate(motion_of(self.places, self.forces, 3))
+
+    def test_a_gap_costs_a_part_of_the_log_alone(self):
+        motion = motion_of(self.places, self.forces, 0)
+        motion.good[20000:23000] = False
+        motion.force_n[20000:23000] = 99.0
+        motion.place_m[20000:23000] = 99.0
+        found = estimate.estimate(motion)
+        truth = study.truth_of(self.arms[0])
+        self.assertLess(np.abs(found.values[:3] / truth[:3] - 1).max(), 0.03)
+
+    def test_an_axis_that_is_held_is_named_and_a_device_that_is_held_has_nothing(self):
+        motion = motion_of(self.places, self.forces, 0)
+        motion.place_m[:, 2] = motion.place_m[0, 2]
+        found = estimate.estimate(motion)
+        self.assertEqual(found.moved, ["x", "y"])
+        self.assertTrue(np.isnan(found.values[2]) and np.isnan(found.values[11]))
+        self.assertRegex("\n".join(device_file.remarks(found)), "z did not move")
+        self.assertNotIn("mass_kg", device_file.text_of(found, 0.001, "log"))
+        motion.place_m[:] = motion.place_m[0]
+        with self.assertRaisesRegex(estimate.NoEstimate, "no axis moved"):
+            estimate.estimate(motion)
+
+
+class TestHand(unittest.TestCase):
+    def test_a_push_from_outside_is_noticed_and_left_out(self):
+        arms = emulated.draw(5, 1)[[4]]
+
+        def push(now, tick, sent):
+            now["weight"][0] = arms["weight"][0] + (0.8 if 20000 <= tick < 21500 and tick % 300 < 150 else 0.0)
+
+        experiment = Experiment(np.full(1, emulated.LIMIT_N))
+        found = estimate.estimate(motion_of(*emulated.run(LIB, arms, experiment, SECONDS, push), 0))
+        self.assertTrue(found.spoilt)
+        for begin, end in found.spoilt:
+            self.assertTrue(18.9 <= begin and end <= 22.6, found.spoilt)
+        self.assertLess(np.abs(found.values[:3] / study.truth_of(arms[0])[:3] - 1).max(), 0.03)
+        self.assertRegex("\n".join(device_file.remarks(found)), "something else moved the tip")
+
+
+class TestLog(unittest.TestCase):
+    def rows(self, count=400):
+        ticks = np.zeros(count, TICK)
+        ticks["tick"] = np.arange(count) + 1000
+        ticks["phase"] = log_motion.ACTIVE
+        ticks["position_mm"] = np.arange(count)[:, None] * [1.0, 2.0, 3.0] + 5.0
+        ticks["commanded_force_n"] = 0.5
+        return ticks
+
+    def test_a_late_report_is_on_the_line_of_its_neighbours_and_a_gap_is_marked(self):
+        ticks = self.rows()
+        ticks["stale"][50], ticks["position_mm"][50] = 1, ticks["position_mm"][49]
+        ticks["stale"][100:110] = np.arange(1, 11)
+        ticks = np.delete(ticks, slice(200, 230))
+        motion, lines = log_motion.motion_of(ticks, 0.001, 2.0, np.array([5.0, 5.0, 5.0]))
+        self.assertEqual(len(motion.place_m), 400)
+        self.assertAlmostEqual(motion.place_m[50, 0], 50 / 2e3)
+        self.assertEqual(list(np.flatnonzero(~motion.good)), [*range(100, 110), *range(200, 230)])
+        self.assertRegex(lines[0], "40 of 400 ticks")
+
+    def test_a_log_without_a_force_is_refused_in_one_line(self):
+        ticks = self.rows()
+        ticks["phase"] = 1
+        with self.assertRaisesRegex(estimate.NoEstimate, "no tick with the motors on"):
+            log_motion.motion_of(ticks, 0.001, 1.0, np.zeros(3))
+
+    def test_the_command_says_in_one_line_what_is_wrong(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for words, code, line in (([], 2, "no --log"), (["--log", folder], 2, "ticks.npy"), (["--log", folder, "--out", "a"], 2, "is no .toml"),
+                                      (["--lag", "a"], 2, "unrecognized arguments: --lag a")):
+                done = subprocess.run([sys.executable, "-B", f"{ROOT}/identify", ROOT, *words], capture_output=True, text=True, check=False)
+                self.assertEqual((done.returncode, done.stderr.count("\n"), done.stdout), (code, 1, ""), done.stderr)
+                self.assertIn(line, done.stderr)
+
+
+class TestBoundary(unittest.TestCase):
+    def test_the_boundary_of_a_short_delay_is_that_of_diolaiti(self):
+        # b + B over half a period, for a large mass and a little damping.
+        self.assertAlmostEqual(boundary.highest_stiffness(5.0, 0.5, 0.0, 0.001, 0.0) / (0.5 / 0.0005), 1.0, places=1)
+
+
+if __name__ == "__main__":
+    unittest.main()
