@@ -172,7 +172,7 @@ std::string import_page() {
           "`.ci/all import` tries 10,000.\n"
           "How to import is in [A volume of your own](own-volume.md).\n\n"
           "This page is made by a test, which fails if it differs:\n\n"
-          "    KERF_WRITE_PAGE=1 build/release/bin/test_import_truth -tc='*import.md*'\n";
+          "    KERF_WRITE_PAGE=1 build/release/bin/test_volume_readers -tc='*import.md*'\n";
   constexpr std::uint64_t kSeeds = 6;
   std::string format;
   for (std::size_t s = 0; s < situations().size(); ++s) {

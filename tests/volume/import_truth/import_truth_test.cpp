@@ -73,7 +73,7 @@ TEST_CASE("docs/import.md is what the files do") {
   if (std::getenv("KERF_WRITE_PAGE") != nullptr) std::ofstream(path, std::ios::binary) << made;
   std::ifstream file(path, std::ios::binary);
   const std::string page{std::istreambuf_iterator<char>(file), {}};
-  INFO("renew it: KERF_WRITE_PAGE=1 build/release/bin/test_import_truth -tc='*import.md*'");
+  INFO("renew it: KERF_WRITE_PAGE=1 build/release/bin/test_volume_readers -tc='*import.md*'");
   CHECK((page == made));
   std::istringstream lines(made), kept(page);  // the first line that differs
   for (std::string line, old; std::getline(lines, line);) {
