@@ -96,8 +96,10 @@ Json figures_of(const FaultOutcome& worst) {
 }
 
 /// Returns true if this script breaks a part that the cell's device has, or has no faults; of a
-/// pair each one.
+/// pair each one. A program goes wrong only where one gives the force.
 bool applies(const NamedScript& named, const Cell& cell) {
+  const bool is_external = cell.scene.force.model == ForceModel::external;
+  if (named.program != ProgramWay::steady) return is_external;
   if (!named.script || named.script->faults.empty()) return true;
   const auto concern = [&](const DeviceFault& fault) {
     return concerns(fault.kind, cell.scene.device.personality, cell.by_service);
@@ -121,7 +123,8 @@ FaultRow run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_
     FaultOutcome outcome = run_faults({.scene = cell.scene,
                                        .hand = cell.hand,
                                        .by_service = cell.by_service,
-                                       .stop_s = named.stop_s},
+                                       .stop_s = named.stop_s,
+                                       .program = named.program},
                                       played(named, seed));
     row.latches = outcome.demanded;
     const std::string name = "seed " + std::to_string(seed) + ": ";
@@ -246,6 +249,17 @@ int rate_of(const std::string& word) {
   return rate_hz;
 }
 
+/// A program that goes wrong, in each of its ways; no fault of a device.
+std::vector<NamedScript> wrong_programs() {
+  std::vector<NamedScript> all;
+  for (std::size_t way = 1; way < kProgramWords.size(); ++way) {
+    all.push_back({.name = std::string(kProgramWords[way]),
+                   .script = FaultScript{},
+                   .program = static_cast<ProgramWay>(way)});
+  }
+  return all;
+}
+
 template <class Enum, class Words>
 Enum named(const std::string& word, const Words& words) {
   return static_cast<Enum>(std::ranges::find(words, word) - std::ranges::begin(words));
@@ -285,7 +299,7 @@ Command::Command(Arguments& program)
   app_.option("--rate", rates_, "of the servo, Hz, each a divisor of 8000; all: 250 to 8000")
       .split_at_commas()
       .shown_as("HZ,... [1000]");
-  app_.option("--model", models_, "of the force: proxy, paper")
+  app_.option("--model", models_, "of the force: proxy, paper; a scene of a program's has its own")
       .one_of(kModelWords)
       .split_at_commas()
       .shown_as("NAME,... [proxy]");
@@ -305,7 +319,11 @@ Command::Command(Arguments& program)
               "two scripts at once, and each with a signal that asks the controller to end: of "
               "PARTS parts of all pairs this one; 1/1: all")
       .shown_as("PART/PARTS");
-  app_.option("--scene", scene_, "what is touched").shows_default();
+  app_.option(
+          "--scene", scene_,
+          "what is touched; scenes/external.toml: by a program, which also stops, dies, gives NaN "
+          "and floods")
+      .shows_default();
   app_.option("--hand", hand_, "how").shows_default();
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
   app_.footer(
@@ -347,6 +365,10 @@ std::vector<Cell> Command::cells() const {
         LoadedScene scene = load_scene(place, overrides);
         HandScript hand = script;
         if (!hand.unit_mm) hand.unit_mm = hand_unit_mm(scene);
+        if (scene.force.model == ForceModel::external) {
+          cells.push_back({scene, hand, device, "external", numeric, by_service});
+          continue;
+        }
         for (const std::string& model : models_) {
           scene.force.model = named<ForceModel>(model, kModelWords);
           cells.push_back({scene, hand, device, model, numeric, by_service});
@@ -364,8 +386,9 @@ int Command::run(std::ostream& out) const {
     const auto share = pair_share_of(pairs_);
     if (!share) throw HilError("--pairs: " + pairs_ + ": not a part of parts; use such as 3/40");
     scripts = pairs_of(scripts, *share);
-  } else if (random_ != 0) {
-    scripts.push_back({.name = "at random"});
+  } else {
+    if (random_ != 0) scripts.push_back({.name = "at random"});
+    for (NamedScript& program : wrong_programs()) scripts.push_back(std::move(program));
   }
   const std::vector<Cell> all = cells();
   struct Job {

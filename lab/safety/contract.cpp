@@ -67,7 +67,9 @@ SafetyMonitor::SafetyMonitor(const LoadedScene& scene, bool trusted, FaultOutcom
       trusted_(trusted),
       outcome_(outcome),
       wire_(scene.device.personality, scene.device.dock_rad),
-      outward_(scene) {}
+      outward_(scene) {
+  if (scene.force.model == ForceModel::external) program_stale_ms_ = scene.force.stale_ms;
+}
 
 void SafetyMonitor::fault_begins(double time_ms) noexcept {
   if (outcome_.latched == fault_name(Fault::none)) begun_ms_ = time_ms;
@@ -210,7 +212,7 @@ void SafetyMonitor::follow_stillness(double time_ms) {
   const double still_ms = time_ms - still_since_ms_;
   const bool changed = !(told_ == still_);
   stands_still_ = !changed && still_ms > kStillMs;
-  if (changed || (last_.asked.off() && still_ms <= kStillMs)) {
+  if (changed || (!last_.asked.has_torque() && still_ms <= kStillMs)) {
     still_ = told_;
     still_since_ms_ = time_ms;
   } else if (off_ == Off::no_reason) {
@@ -259,6 +261,7 @@ void SafetyMonitor::commanded(double time_ms, std::span<const std::uint8_t> pack
     check_change(command);
     check_hold(command);
     check_direction(command);
+    check_program(command);
   }
   if (fresh_ || begins_anew_) held_n_ = command.force_n;
   if (asked->off() && !last_.asked.off()) began_off_ms_ = time_ms;
@@ -357,6 +360,17 @@ void SafetyMonitor::check_direction(const Command& command) {
   const double for_ms = command.time_ms - inward_since_ms_;
   check(for_ms <= kTurnMs, command.time_ms, "ms in which the force points into the solid", for_ms,
         kTurnMs);
+}
+
+/// A program that gives nothing any more: its force falls as that of reports that are lost, no
+/// faster than the slew allows.
+void SafetyMonitor::check_program(const Command& command) {
+  if (!program_stale_ms_) return;
+  const double fall_ms = kZeroMs - kHoldMs + limits_.force_n / limits_.slew_n_per_ms;
+  const double limit_ms = *program_stale_ms_ + fall_ms + 2 * tick_ms_;
+  const double silent_ms = command.time_ms - program_gave_ms_;
+  check(silent_ms <= limit_ms || norm(command.force_n) <= kStepN, command.time_ms,
+        "force, ms after the program's last one", silent_ms, limit_ms);
 }
 
 void SafetyMonitor::heat_until(double time_ms) {

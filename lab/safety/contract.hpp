@@ -39,6 +39,9 @@ class SafetyMonitor {
   void asked_to_end(double time_ms) noexcept { ended_ms_ = time_ms; }
   /// The host knows that the device has ended its side of the link.
   void link_ended() noexcept { link_ended_ = true; }
+  /// A program gave a force for the next tick, which the servo took: of an external scene. Without
+  /// one for force.stale_ms it falls to zero.
+  void program_gave(double time_ms) noexcept { program_gave_ms_ = time_ms; }
   /// A packet that the host has sent.
   void commanded(double time_ms, std::span<const std::uint8_t> packet);
   /// A bus cycle of the device is over.
@@ -75,11 +78,14 @@ class SafetyMonitor {
   void check_change(const Command& command);
   void check_hold(const Command& command);
   void check_direction(const Command& command);
+  void check_program(const Command& command);
   void heat_until(double time_ms);
   void check(bool kept, double time_ms, const char* rule, double value, double limit);
   void broken(double time_ms, const std::string& what);
 
   LimitSettings limits_;
+  std::optional<double> program_stale_ms_;  ///< of an external scene
+  double program_gave_ms_ = -1e9;           ///< the newest force
   double tick_ms_;
   bool trusted_;
   FaultOutcome& outcome_;

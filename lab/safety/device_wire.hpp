@@ -27,9 +27,8 @@ struct ObservedCommand {
   std::array<std::int16_t, 3> count{};
   bool motors_on = false;
 
-  [[nodiscard]] bool off() const noexcept {
-    return !motors_on && count == std::array<std::int16_t, 3>{};
-  }
+  [[nodiscard]] bool off() const noexcept { return !motors_on && !has_torque(); }
+  [[nodiscard]] bool has_torque() const noexcept { return count != std::array<std::int16_t, 3>{}; }
 };
 
 /// The packets of one emulated device as they go over the wire, read by the emulator's geometry:

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hil/script/fault_script.hpp"
+#include "lab/safety/emulated_program.hpp"
 
 /// Two faults at once: the scripts of hil/faults in pairs, and each with a signal that asks the
 /// controller to end. A pair has no contract of its own: every bound of either fault holds, and
@@ -19,8 +20,9 @@ namespace kerf::faults {
 struct NamedScript {
   std::string name;
   std::optional<FaultScript> script{};
-  std::size_t second_from = SIZE_MAX;  ///< of a pair: where the second script's faults begin
-  std::optional<double> stop_s{};      ///< as in FaultCase
+  std::size_t second_from = SIZE_MAX;       ///< of a pair: where the second script's faults begin
+  std::optional<double> stop_s{};           ///< as in FaultCase
+  ProgramWay program = ProgramWay::steady;  ///< as in FaultCase
 };
 
 /// One of `parts` equal parts of all pairs, from 1.

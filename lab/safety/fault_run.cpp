@@ -140,6 +140,9 @@ class GuardedLoop {
     if (cycle % cycles_per_look_ == 0) watchdog_.look(now_ns);
   }
 
+  /// The last tick, of which only a program's turn makes use.
+  [[nodiscard]] const ServoOutput& last() const noexcept { return last_; }
+
   /// A tick that is due; a late host misses it.
   void tick(std::int64_t now_ns, bool host_is_late) {
     if (host_is_late) {
@@ -150,8 +153,8 @@ class GuardedLoop {
     const bool stalled = stall_before(signals_, standstill_.stood_still(now_ns)) != nullptr;
     static_cast<void>(
         apply_commands({.fade_in = stalled, .missed = std::exchange(missed_, 0)}, loop_.servo()));
-    const ServoOutput output = loop_.servo().step(report);
-    send_tick(std::span(&output, 1), signals_, loop_.driver());
+    last_ = loop_.servo().step(report);
+    send_tick(std::span(&last_, 1), signals_, loop_.driver());
     ++signals_.heartbeat;
     if (!is_asked_to_end_) return;
     has_ended_ = true;
@@ -167,6 +170,7 @@ class GuardedLoop {
   std::uint64_t cycles_per_look_ =
       static_cast<std::uint64_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
   std::uint32_t missed_ = 0;  ///< ticks
+  ServoOutput last_;
   bool is_asked_to_end_ = false, has_ended_ = false;
 };
 
@@ -242,6 +246,10 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   VirtualLoop loop(scene, wire, port);
 
   GuardedLoop controller(loop);
+  std::optional<EmulatedProgram> program;
+  if (scene.force.model == ForceModel::external) {
+    program.emplace(scene.force, subject.program, script.seed);
+  }
   double first_push_ms = -1;
   std::uint64_t begun_before_end = 0;
   // A service does not show a servo that is ready: the emulated hand begins 2 s later.
@@ -256,7 +264,10 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     if (link && link->has_left_pushing()) contract.service_left_pushing(time_ms);
 #endif
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
-    if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;
+    if (first_push_ms < 0 && outcome.pushed) {
+      first_push_ms = time_ms;
+      if (program) program->go_wrong(time_ms + later_ms(script));
+    }
     const auto now_ns = static_cast<std::int64_t>(time_ms * 1e6);
     if (!controller.is_asked_to_end() && subject.stop_s && first_push_ms >= 0 &&
         time_ms >= first_push_ms + later_ms(script) + *subject.stop_s * 1000) {
@@ -266,6 +277,9 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     }
     if (controller.has_ended()) continue;
     controller.look(static_cast<std::uint64_t>(cycle) + script.seed, now_ns);
+    if (due && program && program->turn(time_ms, controller.last(), loop.servo())) {
+      contract.program_gave(time_ms);
+    }
     if (due) controller.tick(now_ns, device.host_is_late());
   }
   constexpr double kGraceMs = 50;

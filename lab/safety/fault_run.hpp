@@ -8,6 +8,7 @@
 #include "controller/load/loaded_scene.hpp"
 #include "hil/device/hand_script.hpp"
 #include "hil/script/fault_script.hpp"
+#include "lab/safety/emulated_program.hpp"
 #include "shared/wire/personality.hpp"
 
 namespace kerf::faults {
@@ -20,6 +21,8 @@ struct FaultCase {
   /// So long after the first push a signal asks the controller to end, as in its MotorGuard: the
   /// motors go off for good, the tick under way is the last one.
   std::optional<double> stop_s{};
+  /// Of the program, if the scene's force is external; it goes wrong with the first push.
+  ProgramWay program = ProgramWay::steady;
 };
 
 /// Whether this program was built with the Inverse3's service.

@@ -15,6 +15,7 @@ using vec3::operator-;
 using vec3::operator*;
 
 OutwardNormal::OutwardNormal(const LoadedScene& scene) : scene_(scene) {
+  if (scene.force.model == ForceModel::external) return;  // nothing of a solid is felt
   const SceneTool& tool = scene.tools[scene.active_tool];
   if (scene.volumes.size() != 1 || tool.shape != "ball" || scene.cut.model != CutModel::none) {
     return;

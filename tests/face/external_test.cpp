@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The force of a program in place of contact: fading, holding, coupling, limits, log and replay.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -76,6 +77,77 @@ TEST_CASE("a program that is late by less than force.stale_ms is not felt") {
   for (int i = 0; i < 20; ++i) {
     CHECK(loop.steps(99).contact_force_n[1] == 0.5F);
     CHECK(loop.pushed(kUp, 1).contact_force_n[1] == 0.5F);
+  }
+}
+
+TEST_CASE("a program at 200 Hz is felt alike at every rate of the servo") {
+  constexpr int kProgramHz = 200;
+  constexpr double kStiffness = 0.4, kDamping = 0.001, kFadeMs = 100, kStaleMs = 20, kFallMs = 15;
+  for (const int rate_hz : {250, 500, 1000, 2000, 4000, 8000}) {
+    CAPTURE(rate_hz);
+    const kerf::Scene scene = external({"servo.rate_hz=" + std::to_string(rate_hz)});
+    REQUIRE(scene.rate_hz() == rate_hz);
+    kerf::Servo servo(scene);
+    kerf::Hand hand(scene);
+    // A floor at y = 0, by its place: the servo renders the spring at its own rate. The tip begins
+    // in its dock, below.
+    bool was_above = false;
+    const auto give = [&](std::uint64_t tick) {
+      const std::uint64_t turn = tick * kProgramHz / static_cast<unsigned>(rate_hz);
+      if (tick > 0 && turn == (tick - 1) * kProgramHz / static_cast<unsigned>(rate_hz)) return;
+      const kerf::TickRecord& now = servo.last();
+      kerf::ProgramForce force;
+      was_above = was_above || now.position_mm[1] > 0;
+      if (was_above && now.position_mm[1] < 0) {
+        force.goal_mm = {now.position_mm[0], 0, now.position_mm[2]};
+        force.stiffness_n_per_mm = kStiffness;
+        force.damping_ns_per_mm = kDamping;
+      }
+      REQUIRE(servo.give_force(force));
+    };
+    // The scene's hand is 1 mm below the floor from 2.9 s on, for 0.6 s.
+    const auto ticks_in = [&](double ms) { return static_cast<int>(ms * rate_hz / 1000); };
+    const auto step = [&] { return servo.step(hand.next(servo.last())); };
+    double pressed_n = 0;
+    while (pressed_n < 0.2) {
+      REQUIRE(servo.last().tick < 5 * static_cast<unsigned>(rate_hz));
+      give(servo.last().tick);
+      pressed_n = static_cast<double>(step().commanded_force_n[1]);
+    }
+    for (int i = 0; i < ticks_in(300); ++i) {  // beyond the moment at which it comes down
+      give(servo.last().tick);
+      step();
+    }
+    double worst_n = 0;
+    for (int i = 0; i < ticks_in(100); ++i) {
+      give(servo.last().tick);
+      const kerf::TickRecord tick = step();
+      const double want_n = kStiffness * -tick.position_mm[1] -
+                            kDamping * static_cast<double>(tick.velocity_mm_per_s[1]);
+      worst_n =
+          std::max(worst_n, std::abs(static_cast<double>(tick.commanded_force_n[1]) - want_n));
+    }
+    CHECK(servo.last().position_mm[1] < -0.2);
+    CHECK(worst_n < 0.01);  // a step of the motor's counts, and one of the encoders between reports
+    // Its end: the force holds, falls, is gone, in the same time.
+    int felt = 0;
+    while (servo.last().contact_force_n[1] > 0) {
+      step();
+      ++felt;
+    }
+    const double tick_ms = 1000.0 / rate_hz, program_ms = 1000.0 / kProgramHz;
+    CHECK(felt * tick_ms <= kStaleMs + kFallMs + 2 * tick_ms);
+    CHECK(felt * tick_ms >= kStaleMs + kFallMs - program_ms - 2 * tick_ms);
+    // And anew: it fades in.
+    int fading = 0;
+    float before_n = -1;
+    while (servo.last().contact_force_n[1] > before_n) {
+      before_n = servo.last().contact_force_n[1];
+      REQUIRE(servo.give_force(kUp));
+      step();
+      ++fading;
+    }
+    CHECK((fading - 1) * tick_ms == doctest::Approx(kFadeMs).epsilon(0.05));
   }
 }
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/safety/fault_run.hpp"
 
+#include <cstddef>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include "hil/device/emulator.hpp"
 #include "hil/device/falcon.hpp"
 #include "tests/servo/support.hpp"
 
@@ -131,6 +134,33 @@ TEST_CASE("whatever a service does to its link, what kerf has sent ends the forc
       CHECK(outcome.pushed);
       CHECK(outcome.inconclusive.empty());
       CHECK_FALSE(outcome.pushed_again);  // not parked again
+    }
+  }
+}
+
+TEST_CASE("whatever a program with the force does, no rule is broken, and its force ends with it") {
+  using kerf::faults::ProgramWay;
+  for (const Personality device : {Personality::omni, Personality::omega}) {
+    for (const ProgramWay way : {ProgramWay::steady, ProgramWay::stops, ProgramWay::dies,
+                                 ProgramWay::no_numbers, ProgramWay::floods}) {
+      CAPTURE(kerf::word_of(device));
+      CAPTURE(kerf::faults::kProgramWords[static_cast<std::size_t>(way)]);
+      kerf::LoadedScene scene = kerf::test::half_space_scene();
+      scene.force.model = kerf::ForceModel::external;
+      scene.device.personality = device;
+      scene.device.offset_mm = {};
+      scene.device.torque_scale = kerf::torque_scale_of(device);
+      scene.limits.force_n = 1.5;
+      kerf::HandScript hand;
+      hand.start = {0, 4, 0};
+      hand.steps = {kerf::hand_move({0, -2, 0}, 0.4), kerf::hand_move({0, -2, 0}, 10)};
+      const auto outcome =
+          kerf::faults::run_faults({.scene = scene, .hand = hand, .program = way}, {.faults = {}});
+      for (const std::string& violation : outcome.violations) MESSAGE(violation);
+      CHECK(outcome.violation_count == 0);
+      CHECK(outcome.inconclusive.empty());
+      CHECK(outcome.latched == "none");  // without torque an arm may stand still for long
+      CHECK((outcome.pushed_again || way == ProgramWay::dies));
     }
   }
 }

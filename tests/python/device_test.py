@@ -5,6 +5,7 @@
 import math
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -27,9 +28,12 @@ class TestDevice(unittest.TestCase):
         self.controller = self.start("kerf-controller", "--scene", ROOT / "scenes/external.toml", "--name", "python-device", "--torque-scale",
                                      "0.342,0.342,0.342", "--port", f"socket:{socket}", "--set", "force.stale_ms=500")
         self.start("kerf-emulator", "--socket", socket, "--hand", ROOT / "scenes/hands/touch.toml")
-        while not pathlib.Path(home.name, "kerf/external-python-device.page").exists():
+        while True:
             self.assertIsNone(self.controller.poll())
-            time.sleep(0.01)
+            try:
+                return kerf.Device("python-device").close()
+            except kerf.Error:  # not ready yet
+                time.sleep(0.01)
 
     def start(self, name, *words):
         program = subprocess.Popen([BIN / name, *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -64,6 +68,15 @@ class TestDevice(unittest.TestCase):
             device.wait()
         with self.assertRaisesRegex(kerf.Error, "no controller"):
             kerf.Device("python-device")
+
+    def test_a_batch_of_worlds_at_its_own_rate_is_felt(self):
+        example = ROOT / "examples/external/batch_loop.py"
+        self.assertLessEqual(len(example.read_text().splitlines()), 40)
+        done = subprocess.run([sys.executable, "-B", example, "python-device", "8"], capture_output=True, text=True, timeout=120, check=False)
+        said = re.fullmatch(r"(\d+) steps, the first plate down to (-[\d.]+) mm, the others to (-?[\d.]+) mm\n", done.stdout)
+        self.assertTrue(said, done.stdout + done.stderr)
+        self.assertEqual(float(said[3]), 0)
+        self.assertLess(float(said[2]), -0.3)
 
     def test_ctrl_c_ends_a_wait_for_a_controller_that_stands_still(self):
         with kerf.Device("python-device") as device:
