@@ -8,7 +8,7 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 .ci/packages.sh build check lint
 clang=$(cmake/clang-version.sh)
 cmake -B build/tidy -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER="clang++-$clang" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \
-  -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DKERF_JOIN_FILES=ON --log-level=NOTICE
+  -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON --log-level=NOTICE
 # What the compiler reads of each: a source of the tree, or one of the build that joins such. Generated sources are made first.
 mapfile -t files < <(python3 - "$PWD" "${1:-.}" <<'PYTHON'
 import json, pathlib, re, subprocess, sys

@@ -40,7 +40,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ".ci/mutations.txt"
 BUILD = ROOT / "build/release"
 LISTS = ("safety", "kernels", "devices", "arms", "includes", "page", "contact")
-PAGE_TEST = "tests/page/script_test.py"
+PAGE_TEST = "tests/web/script_test.py"
 
 
 # What controller/kernel/kernel_set.cpp asks of the processor for each set.

@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 root = pathlib.Path(sys.argv[1]).resolve()
-sys.path.insert(0, str(root / "tests" / "page"))
+sys.path.insert(0, str(root / "tests" / "web"))
 import browser
 import pages
 

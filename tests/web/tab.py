@@ -4,15 +4,13 @@ of this process has the page for."""
 import argparse
 import pathlib
 import shutil
-import sys
 import tempfile
 import time
 
+from browser import Page, find_chromium
 from served import Quiet, served
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / 'tests/page'))
-from browser import Page, find_chromium  # noqa: E402
 
 # Of the page, as JavaScript.
 RUNS = "document.body?.dataset.run === 'runs' && document.body.dataset.state === 'live'"

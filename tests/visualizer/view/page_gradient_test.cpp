@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page repeats in JavaScript of the gradient of voxels: here and in
-// tests/page/script/cell_gradients.mjs filters and gradients are those of cell_gradients.json,
+// tests/web/script/cell_gradients.mjs filters and gradients are those of cell_gradients.json,
 // which KERF_GOLDEN=renew in the environment makes anew.
 #include <algorithm>
 #include <array>

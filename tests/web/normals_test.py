@@ -10,8 +10,7 @@ import subprocess
 import sys
 import tempfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'web'))
-from tab import ROOT, check, exit_code  # noqa: E402
+from tab import ROOT, check, exit_code
 
 # Those of the visualizer's own test, at 99 of 100 points.
 MOST_DEGREES, MOST_OF_BINARY = 3.0, 3.75
@@ -21,7 +20,7 @@ FEW = [(1, 1, 1), (1, 1, 1.5), (1, 3.7, 1), (1, 2, 8), (10, 1, 1), (1, 10, 10)]
 
 def make_folder(folder):
     """The page's modules, with shaders whose light is the normal."""
-    for place in ('bridge/page/web/*.js', 'tests/page/browser_script/*.js'):
+    for place in ('bridge/page/web/*.js', 'tests/web/browser_script/*.js'):
         for file in ROOT.glob(place):
             shutil.copy(file, folder)
     light = folder / 'normals.cmake'

@@ -2,7 +2,7 @@
 """What the page costs in headless Chromium without a graphics card: first picture, bytes before the
 volume, pictures a second at 512x512 while the camera turns and while the hand cuts, of the default scene.
 
-    measure.py BIN-FOLDER REPOSITORY"""
+    measure_bridge.py BIN-FOLDER REPOSITORY"""
 import os
 import shutil
 import sys

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The page's scripts without a browser: each file of tests/page/script under Node, beside the page's own modules.
+"""The page's scripts without a browser: each file of tests/web/script under Node, beside the page's own modules.
 
     script_test.py [NAME...]      NAME: only these of the files, such as arrows
 Exit code 77: skipped, without node."""
@@ -27,7 +27,7 @@ if not shutil.which("node"):
     sys.exit(77)
 with tempfile.TemporaryDirectory() as temporary:
     folder = pathlib.Path(temporary)
-    for place in ("bridge/page/web/*.js", "bridge/page/web/index.html", "web/page/*.js", "tests/page/script/*.mjs",
+    for place in ("bridge/page/web/*.js", "bridge/page/web/index.html", "web/page/*.js", "tests/web/script/*.mjs",
                   "tests/visualizer/view/cell_gradients.json"):
         for file in ROOT.glob(place):
             shutil.copy(file, folder)
