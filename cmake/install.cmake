@@ -113,6 +113,14 @@ install(FILES controller/device/invalid.kerf.kerf.metainfo.xml DESTINATION ${CMA
 install(DIRECTORY examples python DESTINATION ${CMAKE_INSTALL_DOCDIR}
   PATTERN __pycache__ EXCLUDE PATTERN python/module EXCLUDE PATTERN python/kerf EXCLUDE PATTERN python/CMakeLists.txt EXCLUDE)
 
+if(TARGET kerf_python)  # import kerf, beside the scenes, for Debian's Python
+  set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME python)
+  set(packages lib/python3/dist-packages)
+  install(TARGETS kerf_python DESTINATION ${packages}/kerf)
+  install(DIRECTORY python/kerf python/kerf_reader DESTINATION ${packages} FILES_MATCHING PATTERN *.py PATTERN __pycache__ EXCLUDE)
+  install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-kerf)
+endif()
+
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/kerf-dev)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/kerf)

@@ -31,9 +31,25 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME kerf-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   "kerf (= ${PROJECT_VERSION}), cmake, g++, pkgconf, libgdcm-dev, libpng-dev, libtiff-dev, zlib1g-dev, libarchive-dev, libexpat1-dev, liblz4-dev, libusb-1.0-0-dev, libhidapi-dev, libseccomp-dev")
+set(pairs kerf:kerf development:kerf-dev)
+if(TARGET kerf_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  list(APPEND pairs python:python3-kerf)
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "kerf's servo, its emulated devices and hands, its recordings and its
+stability maps as a module for Python, import kerf, with arrays of NumPy.")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-kerf)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+  # The module is of one Python.
+  math(EXPR next "${Python3_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "kerf (= ${PROJECT_VERSION}), python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3 (<< ${Python3_VERSION_MAJOR}.${next}), python3-numpy")
+endif()
 # The changelog of a package in Debian's form, which leads to the one for users.
 string(TIMESTAMP day "%a, %d %b %Y %H:%M:%S +0000" UTC)
-foreach(package kerf kerf-dev)
+foreach(pair ${pairs})
+  string(REPLACE ":" ";" pair ${pair})
+  list(GET pair 0 component)
+  list(GET pair 1 package)
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/changelog/${package} CONTENT
 "kerf (${PROJECT_VERSION}) unstable; urgency=medium
 
@@ -41,11 +57,6 @@ foreach(package kerf kerf-dev)
 
  -- ${KERF_MAINTAINER}  ${day}
 ")
-endforeach()
-foreach(pair kerf:kerf development:kerf-dev)
-  string(REPLACE ":" ";" pair ${pair})
-  list(GET pair 0 component)
-  list(GET pair 1 package)
   set(to "${CMAKE_INSTALL_DATADIR}/doc/${package}")
   install(FILES ${PROJECT_BINARY_DIR}/changelog/${package} DESTINATION ${to} RENAME changelog COMPONENT ${component})
   install(CODE "execute_process(COMMAND gzip -9nf \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${to}/changelog\"

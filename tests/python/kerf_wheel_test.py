@@ -50,7 +50,7 @@ with tempfile.TemporaryDirectory() as folder:
     # The lines of the page, as they stand.
     lines = re.search(r"^    python3 -m venv .*\n(?:    .*\n)+", page, re.M).group().splitlines()
     for line in lines:
-        done("bash", "-c", line.strip().replace("build/release/packages", str(home / "packages")).replace("python3 -m", f"{sys.executable} -m"))
+        done("bash", "-c", line.strip().replace("build/python/packages", str(home / "packages")).replace("python3 -m", f"{sys.executable} -m"))
     python = home / "venv/bin/python3"
     began = time.monotonic()
     said = done(python, "-c", """
