@@ -123,7 +123,7 @@ std::uint32_t Segment::send(const ServoCommand& command) {
   const auto kind = kind_of(command.kind);
   if (!kind) return 0;
   return or_error([&] {
-    Command asked;
+    SegmentCommand asked;
     asked.kind = *kind;
     asked.argument = command.argument;
     asked.arm = command.arm;

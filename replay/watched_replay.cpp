@@ -81,7 +81,7 @@ class Keys {
   Tick number_ = 0;
 };
 
-Request request_of(const Command& command, bool is_paused) {
+Request request_of(const SegmentCommand& command, bool is_paused) {
   using enum Request::Kind;
   switch (command.kind) {
     case CommandKind::hold:

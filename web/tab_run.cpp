@@ -122,7 +122,7 @@ struct TabRun::State {
   }
 
   bridge::ReplyMessage answer(const bridge::CommandMessage& asked) {
-    Command command;
+    SegmentCommand command;
     command.kind = static_cast<CommandKind>(asked.kind);
     command.argument = asked.argument;
     command.arm = asked.arm;
@@ -155,7 +155,7 @@ struct TabRun::State {
   ServoOutput output;
   std::array<std::uint64_t, kMaxVolumes> removed_steps{};
   std::vector<double> voxel_mm3;
-  std::deque<Command> commands;
+  std::deque<SegmentCommand> commands;
   std::uint32_t last_index = 0;
 };
 

@@ -206,7 +206,7 @@ class Joiner {
         stop_(stop),
         out_(out),
         mirror_(options.name, options.most_mib << 20,
-                [this](const Command& command) { return remote_.request(command); }),
+                [this](const SegmentCommand& command) { return remote_.request(command); }),
         views_(options.name) {}
 
   int run() {

@@ -236,7 +236,7 @@ void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandM
   }
   if (viewer->commanding) return answer(*viewer, sequence, {ReplyStatus::busy, 0});
   viewer->commanding = true;
-  Command wish;
+  SegmentCommand wish;
   wish.kind = kind;
   wish.argument = message.argument;
   wish.arm = message.arm;

@@ -13,7 +13,7 @@
 
 namespace kerf::bridge {
 
-Reply RemoteCommand::request(const Command& command) noexcept {
+Reply RemoteCommand::request(const SegmentCommand& command) noexcept {
   std::unique_lock lock(mutex_);
   if (link_ != Link::open) {
     return {link_ == Link::down ? ReplyStatus::busy : ReplyStatus::refused, 0};

@@ -86,7 +86,7 @@ class RemoteCommand {
 
   /// Waits for the reply. Returns `busy` after `kPatience`; the command may still reach the
   /// controller.
-  [[nodiscard]] Reply request(const Command& command) noexcept;
+  [[nodiscard]] Reply request(const SegmentCommand& command) noexcept;
 
   /// Network thread, as `answer` and `set_link`: a command to send; each is returned once.
   [[nodiscard]] std::optional<CommandMessage> take();

@@ -148,7 +148,7 @@ struct AckMessage {
 };
 static_assert(sizeof(AckMessage) == 24);
 
-/// `Command` of a viewer.
+/// `SegmentCommand` of a viewer.
 struct CommandMessage {
   std::uint32_t magic;
   std::uint16_t kind;  ///< CommandKind

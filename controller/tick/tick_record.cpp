@@ -163,7 +163,7 @@ DeviceReport report_of(const TickRecord& record, DeviceReport::Kind kind) noexce
 
 static_assert(static_cast<std::uint32_t>(ServoCommand::Kind::mark) == kCommandMark);
 
-ServoCommand servo_command(const Command& command) noexcept {
+ServoCommand servo_command(const SegmentCommand& command) noexcept {
   switch (command.kind) {
     case CommandKind::select_tool:
       return {ServoCommand::Kind::select_tool, command.argument, command.arm};

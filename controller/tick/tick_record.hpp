@@ -18,7 +18,7 @@
 namespace kerf {
 
 /// A reader's command, valid or not, as the servo gets it; `none` for a kind that it lacks.
-[[nodiscard]] ServoCommand servo_command(const Command& command) noexcept;
+[[nodiscard]] ServoCommand servo_command(const SegmentCommand& command) noexcept;
 
 /// What the servo was given in a tick besides the report: with it and the reports a run can be
 /// repeated (replay/replayed_ticks.hpp).
@@ -26,7 +26,7 @@ struct TickCommands {
   ServoCommand command{};        ///< of a reader; `none` in most ticks
   bool fade_in = false;          ///< behind it, after a stall
   std::uint32_t missed = 0;      ///< ticks that were skipped before this one, at most kMostMissed
-  std::uint32_t last_index = 0;  ///< `Command::index` of the last one so far
+  std::uint32_t last_index = 0;  ///< `SegmentCommand::index` of the last one so far
 };
 
 /// Applies what a tick is given, in the order of every loop: the reader's command, the ticks that

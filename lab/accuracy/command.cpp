@@ -27,9 +27,9 @@ std::string line_of(const Entry& entry) {
 }
 
 /// `kerf-lab accuracy`: each knob of the contact force against analytic shapes.
-class Command final : public LabCommand {
+class AccuracyCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit AccuracyCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
@@ -37,7 +37,7 @@ class Command final : public LabCommand {
   int core_ = -1;
 };
 
-Command::Command(Arguments& program)
+AccuracyCommand::AccuracyCommand(Arguments& program)
     : LabCommand(program, "accuracy", "each knob of the contact force against analytic shapes") {
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
   app_.option("--csv", csv_, "write the figures as a table").shown_as("FILE");
@@ -49,7 +49,7 @@ Command::Command(Arguments& program)
   app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
 }
 
-int Command::run(std::ostream& out) const {
+int AccuracyCommand::run(std::ostream& out) const {
   const LabOutput as_json("--report", report_, ".json");
   const LabOutput as_csv("--csv", csv_, ".csv");
   const LabOutput as_page("--page", page_, ".md");
@@ -79,5 +79,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::accuracy
 
 std::unique_ptr<kerf::LabCommand> kerf::make_accuracy_command(Arguments& program) {
-  return std::make_unique<accuracy::Command>(program);
+  return std::make_unique<accuracy::AccuracyCommand>(program);
 }

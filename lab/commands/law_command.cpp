@@ -15,22 +15,22 @@ namespace kerf::laws {
 namespace {
 
 /// `kerf-lab laws`: the laws that this program knows, each tried at its extremes.
-class Command final : public LabCommand {
+class LawsCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit LawsCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
   std::string name_;
 };
 
-Command::Command(Arguments& program)
+LawsCommand::LawsCommand(Arguments& program)
     : LabCommand(program, "laws",
                  "each force law, velocity estimator and stabiliser at its extremes") {
   app_.option("name", name_, "only this one").shown_as("NAME");
 }
 
-int Command::run(std::ostream& out) const {
+int LawsCommand::run(std::ostream& out) const {
   std::vector<const LawRow*> chosen;
   std::vector<std::string_view> known;
   for (const LawKind kind : {LawKind::force, LawKind::velocity, LawKind::stabiliser}) {
@@ -60,5 +60,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::laws
 
 std::unique_ptr<kerf::LabCommand> kerf::make_laws_command(Arguments& program) {
-  return std::make_unique<laws::Command>(program);
+  return std::make_unique<laws::LawsCommand>(program);
 }

@@ -164,9 +164,9 @@ void make_runs(const SweepRequest& request, std::size_t jobs,
 /// `kerf-lab sweep`, which `./kerf sweep` is: one demo in lock-step for each combination of values,
 /// on all cores, into one table. The same sweep gives the same bytes on any number of cores, and
 /// continues after an interruption.
-class Command final : public LabCommand {
+class SweepCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit SweepCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
@@ -178,7 +178,7 @@ class Command final : public LabCommand {
   std::string out_;
 };
 
-Command::Command(Arguments& program)
+SweepCommand::SweepCommand(Arguments& program)
     : LabCommand(program, "sweep",
                  "a demo in lock-step for each combination of values, as one table") {
   app_.option("SCENE", scene_, "scene file (TOML)").required();
@@ -201,7 +201,7 @@ Command::Command(Arguments& program)
       "Exit codes: 0 every run was fine, 1 one failed, 2 bad input or set-up, 130 interrupted.");
 }
 
-int Command::run(std::ostream& out) const {
+int SweepCommand::run(std::ostream& out) const {
   const std::vector<grid::Axis> axes = grid::parse_axes(set_);
   const bool device_is_axis = std::ranges::any_of(
       axes, [](const grid::Axis& axis) { return axis.key == "device.personality"; });
@@ -238,5 +238,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::sweep
 
 std::unique_ptr<kerf::LabCommand> kerf::make_sweep_command(Arguments& program) {
-  return std::make_unique<sweep::Command>(program);
+  return std::make_unique<sweep::SweepCommand>(program);
 }

@@ -266,9 +266,9 @@ Enum named(const std::string& word, const Words& words) {
 }
 
 /// `kerf-lab faults`: every device, rate, fault script and seed against the safety contract.
-class Command final : public LabCommand {
+class FaultsCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit FaultsCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
@@ -285,7 +285,7 @@ class Command final : public LabCommand {
   std::string pairs_;
 };
 
-Command::Command(Arguments& program)
+FaultsCommand::FaultsCommand(Arguments& program)
     : LabCommand(program, "faults", "every device and fault against the safety contract") {
   for (const std::string_view word : kPersonalityWords) devices_.emplace_back(word);
   app_.option("--device", devices_, "only these")
@@ -332,7 +332,7 @@ Command::Command(Arguments& program)
       "set-up.");
 }
 
-std::vector<int> Command::rates() const {
+std::vector<int> FaultsCommand::rates() const {
   std::vector<int> rates;
   for (const std::string& word : rates_) {
     if (word == "all") {
@@ -344,7 +344,7 @@ std::vector<int> Command::rates() const {
   return rates;
 }
 
-std::vector<Cell> Command::cells() const {
+std::vector<Cell> FaultsCommand::cells() const {
   const std::string place = find_scene_file(scene_);
   const HandScript script = read_hand_script(find_data_file(hand_));
   std::vector<Cell> cells;
@@ -379,7 +379,7 @@ std::vector<Cell> Command::cells() const {
   return cells;
 }
 
-int Command::run(std::ostream& out) const {
+int FaultsCommand::run(std::ostream& out) const {
   const LabOutput report("--report", report_, ".json");
   auto scripts = scripts_in(find_data_file(scripts_));
   if (!pairs_.empty()) {
@@ -436,5 +436,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::faults
 
 std::unique_ptr<kerf::LabCommand> kerf::make_faults_command(Arguments& program) {
-  return std::make_unique<faults::Command>(program);
+  return std::make_unique<faults::FaultsCommand>(program);
 }

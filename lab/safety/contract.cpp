@@ -232,7 +232,7 @@ void SafetyMonitor::follow_sparse(double time_ms) {
 
 /// A host that was silent for 20 ms begins at zero and fades in again; the packet that ends the
 /// silence may be the watchdog's packet, and then the next one is the host's own.
-void SafetyMonitor::follow_stall(const Command& command) {
+void SafetyMonitor::follow_stall(const TimedCommand& command) {
   const bool stalled = command.time_ms - last_.time_ms >= kStandstillMs;
   begins_anew_ = stalled || after_stall_;
   if (begins_anew_) may_push_since_ms_ = std::max(may_push_since_ms_, command.time_ms);
@@ -246,10 +246,10 @@ void SafetyMonitor::commanded(double time_ms, std::span<const std::uint8_t> pack
   follow_silence(time_ms);
   follow_stillness(time_ms);
   follow_sparse(time_ms);
-  Command command{.time_ms = time_ms,
-                  .tick_ms = std::min(time_ms - last_.time_ms, tick_ms_),
-                  .asked = *asked,
-                  .force_n = {}};
+  TimedCommand command{.time_ms = time_ms,
+                       .tick_ms = std::min(time_ms - last_.time_ms, tick_ms_),
+                       .asked = *asked,
+                       .force_n = {}};
   if (pose_) command.force_n = wire_.force_n(*pose_, asked->count);
   // Where the arm is stretched out no force at the tip goes with its torques.
   if (!std::isfinite(dot(command.force_n, command.force_n))) command.force_n = last_.force_n;
@@ -271,7 +271,7 @@ void SafetyMonitor::commanded(double time_ms, std::span<const std::uint8_t> pack
   silence_told_ = false;
 }
 
-void SafetyMonitor::check_state(const Command& command) {
+void SafetyMonitor::check_state(const TimedCommand& command) {
   for (const std::int16_t count : command.asked.count) {
     check(std::abs(int{count}) <= wire_.count_end(), command.time_ms, "a motor's counts",
           std::abs(int{count}), wire_.count_end());
@@ -285,7 +285,7 @@ void SafetyMonitor::check_state(const Command& command) {
   broken(command.time_ms, kWhy[static_cast<std::size_t>(off_)]);
 }
 
-void SafetyMonitor::check_size(const Command& command) {
+void SafetyMonitor::check_size(const TimedCommand& command) {
   const double now_n = norm(command.force_n), peak_n = limits_.force_n;
   outcome_.peak_n = std::max(outcome_.peak_n, now_n);
   check(now_n <= peak_n + kStepN, command.time_ms, "force in N", now_n, peak_n);
@@ -311,7 +311,7 @@ void SafetyMonitor::check_size(const Command& command) {
   check(rms_n <= bearable_n + kStepN, command.time_ms, "RMS over 10 s in N", rms_n, bearable_n);
 }
 
-void SafetyMonitor::check_change(const Command& command) {
+void SafetyMonitor::check_change(const TimedCommand& command) {
   if (command.tick_ms <= 0) return;
   // A hand that moves with the force is given energy by it. Across it, only what the force's steps
   // hide may look so.
@@ -332,7 +332,7 @@ void SafetyMonitor::check_change(const Command& command) {
 }
 
 /// What was sent after the last report, turned and weakened by nothing.
-void SafetyMonitor::check_hold(const Command& command) {
+void SafetyMonitor::check_hold(const TimedCommand& command) {
   // Reports that stand still are none, though they were heard. A pose that is none may have
   // latched.
   const bool may_be_latched =
@@ -345,7 +345,7 @@ void SafetyMonitor::check_hold(const Command& command) {
         kStepN);
 }
 
-void SafetyMonitor::check_direction(const Command& command) {
+void SafetyMonitor::check_direction(const TimedCommand& command) {
   const bool pushes = norm(command.force_n) > kPushN;
   const auto out = pushes && way_in_is_known_ ? outward_.at(pose_->tip_mm) : std::nullopt;
   // Deep in the solid after a jump, out is the way back.
@@ -364,7 +364,7 @@ void SafetyMonitor::check_direction(const Command& command) {
 
 /// A program that gives nothing any more: its force falls as that of reports that are lost, no
 /// faster than the slew allows.
-void SafetyMonitor::check_program(const Command& command) {
+void SafetyMonitor::check_program(const TimedCommand& command) {
   if (!program_stale_ms_) return;
   const double fall_ms = kZeroMs - kHoldMs + limits_.force_n / limits_.slew_n_per_ms;
   const double limit_ms = *program_stale_ms_ + fall_ms + 2 * tick_ms_;

@@ -59,7 +59,7 @@ class SafetyMonitor {
  private:
   /// The reason for motors to be off, by the packets until now; `no_reason`: they may be on.
   enum class Off : std::uint8_t { not_calibrated, parked, not_homed, fault, no_reason };
-  struct Command {
+  struct TimedCommand {
     double time_ms = 0;
     double tick_ms = 0;  ///< since the last one, no longer than a tick
     ObservedCommand asked;
@@ -72,13 +72,13 @@ class SafetyMonitor {
   void follow_stillness(double time_ms);
   void follow_sparse(double time_ms);
   void must_stay_off(const char* fault);
-  void follow_stall(const Command& command);
-  void check_state(const Command& command);
-  void check_size(const Command& command);
-  void check_change(const Command& command);
-  void check_hold(const Command& command);
-  void check_direction(const Command& command);
-  void check_program(const Command& command);
+  void follow_stall(const TimedCommand& command);
+  void check_state(const TimedCommand& command);
+  void check_size(const TimedCommand& command);
+  void check_change(const TimedCommand& command);
+  void check_hold(const TimedCommand& command);
+  void check_direction(const TimedCommand& command);
+  void check_program(const TimedCommand& command);
   void heat_until(double time_ms);
   void check(bool kept, double time_ms, const char* rule, double value, double limit);
   void broken(double time_ms, const std::string& what);
@@ -121,7 +121,7 @@ class SafetyMonitor {
   bool after_stall_ = false;      ///< the last packet was one that ends a stall: motors off
   bool begins_anew_ = false;      ///< this packet is the first of a host that was silent: from zero
 
-  Command last_;
+  TimedCommand last_;
   DeviceVec<double> held_n_;  ///< sent after the last report
   bool catches_up_ = false;   ///< the host was late since the last report
   double heat_n2_ = 0;

@@ -132,9 +132,9 @@ void tell(const Part& part, std::ostream& out) {
 constexpr const char* kMapped = "damping,stiffness";
 
 /// `kerf-lab zwidth`: which stiffness and damping a device bears, measured, beside the theory.
-class Command final : public LabCommand {
+class ZwidthCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit ZwidthCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
@@ -161,7 +161,7 @@ class Command final : public LabCommand {
   int jobs_ = 0, seeds_ = 0;
 };
 
-Command::Command(Arguments& program)
+ZwidthCommand::ZwidthCommand(Arguments& program)
     : LabCommand(program, "zwidth",
                  "which stiffness and damping a device bears, beside the theory") {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -223,7 +223,7 @@ Command::Command(Arguments& program)
 /// The program's own laws have a trial at both ends of the stiffness before a map runs them: one
 /// that loops would never end it. A law that gives no number, or allocates, is reported; the map
 /// bears both.
-void Command::try_laws(const MapSpec& map, std::ostream& out) {
+void ZwidthCommand::try_laws(const MapSpec& map, std::ostream& out) {
   std::set<std::string> tried, told;
   for (const Assignment& values : map.columns()) {
     std::string laws;
@@ -315,7 +315,7 @@ void check_filters(const MapSpec& spec) {
   }
 }
 
-std::array<std::string, kAxisCount> Command::axis_texts(std::ostream& out) const {
+std::array<std::string, kAxisCount> ZwidthCommand::axis_texts(std::ostream& out) const {
   std::array<std::string, kAxisCount> texts = axes_;
   std::string& device = texts[index_of(AxisId::device)];
   if (!device.ends_with(".toml")) {
@@ -341,7 +341,7 @@ std::array<std::string, kAxisCount> Command::axis_texts(std::ostream& out) const
   return texts;
 }
 
-MapSpec Command::spec(std::ostream& out) const {
+MapSpec ZwidthCommand::spec(std::ostream& out) const {
   MapSpec spec;
   spec.mapped = mapped_axes(map_);
   spec.arm = arm_;
@@ -393,7 +393,7 @@ MapSpec Command::spec(std::ostream& out) const {
   return spec;
 }
 
-Shard Command::shard() const {
+Shard ZwidthCommand::shard() const {
   const std::size_t slash = shard_.find('/');
   const auto index = number_in(shard_.substr(0, slash));
   const auto count =
@@ -412,7 +412,7 @@ Shard Command::shard() const {
   return {static_cast<std::size_t>(*index), static_cast<std::size_t>(*count)};
 }
 
-void Command::write_page(std::ostream& out) const {
+void ZwidthCommand::write_page(std::ostream& out) const {
   check_can_plot();
   const LabOutput as_page("--page", page_, ".md");
   const std::string devices = page_plot("--page", page_, ".devices.svg"),
@@ -430,8 +430,8 @@ void Command::write_page(std::ostream& out) const {
                        measured, out);
 }
 
-bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
-                      std::ostream& out) const {
+bool ZwidthCommand::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
+                            std::ostream& out) const {
   using Clock = std::chrono::steady_clock;
   std::vector<std::size_t> wanted;
   const std::size_t count = map.columns().size();
@@ -470,13 +470,13 @@ bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
   return true;
 }
 
-bool Command::chooses_map() const {
+bool ZwidthCommand::chooses_map() const {
   return std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); }) ||
          map_ != kMapped || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
          seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1" || !direction_.empty();
 }
 
-int Command::merge(std::ostream& out) const {
+int ZwidthCommand::merge(std::ostream& out) const {
   if (chooses_map() || quick_ || jobs_ > 0 || !page_.empty() || !part_.empty()) {
     throw HilError("--merge: its parts have the map; leave all but --csv, --json and --plot out");
   }
@@ -488,7 +488,7 @@ int Command::merge(std::ostream& out) const {
   return 0;
 }
 
-int Command::run(std::ostream& out) const {
+int ZwidthCommand::run(std::ostream& out) const {
   const bool has_outputs =
       !paths_.csv.empty() || !paths_.json.empty() || !paths_.plot.empty() || !part_.empty();
   if ((!page_.empty() || !portraits_.empty()) && has_outputs) {
@@ -539,5 +539,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::zwidth
 
 std::unique_ptr<kerf::LabCommand> kerf::make_zwidth_command(Arguments& program) {
-  return std::make_unique<zwidth::Command>(program);
+  return std::make_unique<zwidth::ZwidthCommand>(program);
 }

@@ -46,9 +46,9 @@ std::string json_of(const std::vector<LoopWork>& loops, const std::vector<Feel>&
 
 /// `kerf-lab energy`: work of closed paths, and the cost of stabilisers to the hand and to the
 /// processor.
-class Command final : public LabCommand {
+class EnergyCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit EnergyCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
@@ -56,7 +56,7 @@ class Command final : public LabCommand {
   int core_ = -1;
 };
 
-Command::Command(Arguments& program)
+EnergyCommand::EnergyCommand(Arguments& program)
     : LabCommand(program, "energy", "work at the device port, and what stabilisers cost") {
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
   app_.option("--page", page_, "write the figures as a page (docs/energy.md)").shown_as("FILE");
@@ -64,7 +64,7 @@ Command::Command(Arguments& program)
   app_.footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
 }
 
-int Command::run(std::ostream& out) const {
+int EnergyCommand::run(std::ostream& out) const {
   const LabOutput as_json("--report", report_, ".json");
   const LabOutput as_page("--page", page_, ".md");
   LabOutput::check_distinct({&as_json, &as_page});
@@ -85,5 +85,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::energy
 
 std::unique_ptr<kerf::LabCommand> kerf::make_energy_command(Arguments& program) {
-  return std::make_unique<energy::Command>(program);
+  return std::make_unique<energy::EnergyCommand>(program);
 }

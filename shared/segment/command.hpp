@@ -24,14 +24,14 @@ enum class CommandKind : std::uint32_t {
 
 /// One command, a message of fixed size over the socket. It is validated outside the servo, applied
 /// by the servo between two ticks, and logged as an input.
-struct Command {
+struct SegmentCommand {
   CommandKind kind = CommandKind::hold;
   std::uint32_t index = 0;  ///< set by the server: 1, 2, ... in order of acceptance
   std::uint32_t argument = 0;
   std::uint32_t arm = 0;  ///< select_tool: 0 the first, 1 the second; other kinds: 0, act on both
   std::uint64_t reserved[6] = {};  ///< 0
 };
-static_assert(sizeof(Command) == 64);
+static_assert(sizeof(SegmentCommand) == 64);
 
 enum class ReplyStatus : std::uint32_t {
   accepted = 0,  ///< queued; applied within `kCommandSlots` ticks
@@ -42,7 +42,7 @@ enum class ReplyStatus : std::uint32_t {
 /// The immediate reply of the server to a command.
 struct Reply {
   ReplyStatus status = ReplyStatus::refused;
-  std::uint32_t index = 0;  ///< `Command::index`, for TickRecord::last_command; 0 if not accepted
+  std::uint32_t index = 0;  ///< of the command, for TickRecord::last_command; 0 if not accepted
 };
 static_assert(sizeof(Reply) == 8);
 
@@ -55,7 +55,8 @@ struct CommandLimits {
 };
 
 /// True if `command` may be queued for the servo.
-[[nodiscard]] inline bool is_valid(const Command& command, const CommandLimits& limits) noexcept {
+[[nodiscard]] inline bool is_valid(const SegmentCommand& command,
+                                   const CommandLimits& limits) noexcept {
   const auto is_zero = [](std::uint64_t word) { return word == 0; };
   if (!std::all_of(std::begin(command.reserved), std::end(command.reserved), is_zero)) return false;
   switch (command.kind) {

@@ -213,7 +213,7 @@ bool SegmentConnection::alive() const noexcept {
   return true;
 }
 
-Reply SegmentConnection::send(const Command& command) {
+Reply SegmentConnection::send(const SegmentCommand& command) {
   while (awaited_ > 0) receive();
   if (::send(socket_, &command, sizeof command, MSG_NOSIGNAL) !=
       static_cast<ssize_t>(sizeof command)) {

@@ -37,7 +37,7 @@ class SegmentConnection {
   /// Waits at most 2 s for the reply of the server's thread (not of the servo). Throws
   /// `SegmentError` if the controller has gone or does not reply. After that, the next call waits
   /// for the late reply first, again at most 2 s, and throws without sending if none comes.
-  Reply send(const Command& command);
+  Reply send(const SegmentCommand& command);
 
  private:
   /// Receives the oldest reply that has not come.
@@ -52,8 +52,8 @@ class SegmentConnection {
 /// runs (the message names those that do), `SegmentError` on any other failure.
 [[nodiscard]] SegmentConnection connect_segment(std::string_view name);
 
-/// First message of the server, which passes the memfd with it. Then the client sends `Command`s,
-/// and the server replies to each with one `Reply`.
+/// First message of the server, which passes the memfd with it. Then the client sends
+/// `SegmentCommand`s, and the server replies to each with one `Reply`.
 struct SegmentHello {
   std::uint64_t magic = 0;
   std::uint32_t layout_major = 0;

@@ -152,7 +152,7 @@ struct SegmentServer::State {
   /// Replies to one message of a peer; returns false if the peer has gone or does not read the
   /// reply.
   bool answer(int peer) noexcept {
-    Command command;
+    SegmentCommand command;
     const ssize_t length = recv(peer, &command, sizeof command, MSG_DONTWAIT | MSG_TRUNC);
     if (length < 0) return errno == EAGAIN || errno == EINTR;
     if (length == 0) return false;
@@ -168,7 +168,7 @@ struct SegmentServer::State {
     return send(peer, &reply, sizeof reply, MSG_NOSIGNAL | MSG_DONTWAIT) == sizeof reply;
   }
 
-  SpscQueue<Command, kCommandSlots> commands;  // first: it is aligned to cache lines
+  SpscQueue<SegmentCommand, kCommandSlots> commands;  // first: it is aligned to cache lines
   std::string path;
   NameLock lock;
   Listener listener;
@@ -192,7 +192,7 @@ SegmentServer::SegmentServer(std::string_view name, int memfd, std::uint64_t ses
 }
 SegmentServer::~SegmentServer() = default;
 
-std::optional<Command> SegmentServer::take_command() noexcept {
+std::optional<SegmentCommand> SegmentServer::take_command() noexcept {
   return state_->commands.take();
 }
 

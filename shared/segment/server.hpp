@@ -30,14 +30,14 @@ class SegmentServer {
   /// For the segment `memfd` of another writer. The server's thread calls `answer` with each
   /// command, unchecked. No other reader is served until it returns, so it must return within 2 s,
   /// the time that a reader waits for a reply. It must not throw.
-  using Answer = std::function<Reply(const Command&)>;
+  using Answer = std::function<Reply(const SegmentCommand&)>;
   SegmentServer(std::string_view name, int memfd, std::uint64_t session_id, Answer answer);
   ~SegmentServer();
   SegmentServer(const SegmentServer&) = delete;
   SegmentServer& operator=(const SegmentServer&) = delete;
 
   /// Servo thread. Wait-free, no system call. The servo takes at most one per tick.
-  [[nodiscard]] std::optional<Command> take_command() noexcept;
+  [[nodiscard]] std::optional<SegmentCommand> take_command() noexcept;
 
  private:
   struct State;

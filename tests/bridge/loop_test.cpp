@@ -130,7 +130,7 @@ FarPicture far_picture(const SegmentReader& reader) {
 TEST_CASE("at every moment the far segment is the near one's of one tick, however slow the link") {
   const RuntimeFolder folder;
   NearEnd near;
-  Mirror mirror("far", kEnough, [](const Command&) { return Reply{}; });
+  Mirror mirror("far", kEnough, [](const SegmentCommand&) { return Reply{}; });
   std::optional<SegmentConnection> far;
   int seen = 0;
   for (int slot = 0; slot < 400; ++slot) {
@@ -163,7 +163,7 @@ TEST_CASE("at every moment the far segment is the near one's of one tick, howeve
 TEST_CASE("connections that are cut at any moment end in the same volume") {
   const RuntimeFolder folder;
   NearEnd near;
-  Mirror mirror("far", kEnough, [](const Command&) { return Reply{}; });
+  Mirror mirror("far", kEnough, [](const SegmentCommand&) { return Reply{}; });
   std::optional<SegmentConnection> far;
   for (int slot = 0; slot < 600; ++slot) {
     near.mill();
@@ -188,7 +188,7 @@ TEST_CASE("connections that are cut at any moment end in the same volume") {
 TEST_CASE("the end of a run arrives with its last volume") {
   const RuntimeFolder folder;
   NearEnd near;
-  Mirror mirror("far", kEnough, [](const Command&) { return Reply{}; });
+  Mirror mirror("far", kEnough, [](const SegmentCommand&) { return Reply{}; });
   for (int i = 0; i < 50; ++i) {
     near.mill();
     near.slot();

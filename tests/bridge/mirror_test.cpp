@@ -25,7 +25,7 @@ namespace {
 constexpr std::uint64_t kEnough = 1 << 30;
 constexpr std::int64_t kHourNs = 3'600'000'000'000;
 
-Reply refuse(const Command&) {
+Reply refuse(const SegmentCommand&) {
   return {};
 }
 

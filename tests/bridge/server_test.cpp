@@ -370,7 +370,7 @@ TEST_CASE("only who may command reaches the controller, and with what is valid")
   REQUIRE(teacher.until_whole());
   CHECK(teacher.far.hello->head.flags == kMayCommand);
   CHECK(say(teacher, CommandKind::select_tool, 1) == ReplyStatus::accepted);
-  const std::optional<Command> taken = controller.server.take_command();
+  const std::optional<SegmentCommand> taken = controller.server.take_command();
   REQUIRE(taken.has_value());
   CHECK(taken->kind == CommandKind::select_tool);
   CHECK(taken->argument == 1);
@@ -437,7 +437,7 @@ TEST_CASE(
     teacher.client.send_value(CommandMessage{
         kCommandMagic, static_cast<std::uint16_t>(CommandKind::select_tool), arm, 1, 40U + arm});
     REQUIRE(teacher.follow([&] { return teacher.far.replies.size() > before; }));
-    const std::optional<Command> taken = controller.server.take_command();
+    const std::optional<SegmentCommand> taken = controller.server.take_command();
     REQUIRE(taken.has_value() == (arm < 2));
     if (taken) CHECK(taken->arm == arm);
   }

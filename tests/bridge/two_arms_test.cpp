@@ -23,7 +23,7 @@ using namespace kerf::test;
 
 namespace {
 
-Reply refuse(const Command&) {
+Reply refuse(const SegmentCommand&) {
   return {};
 }
 

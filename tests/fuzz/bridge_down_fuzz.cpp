@@ -30,7 +30,7 @@ constexpr std::uint64_t kSession = 7;
 
 /// A run with labels, whose segment is made once.
 struct FarEnd {
-  FarEnd() : mirror("fuzz", kMostBytes, [](const Command&) { return Reply{}; }) {}
+  FarEnd() : mirror("fuzz", kMostBytes, [](const SegmentCommand&) { return Reply{}; }) {}
   Sender sender{kSession, 9, 100, true};
   Mirror mirror;
 };

@@ -63,7 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       static_cast<void>(is_valid(view_in(*view)));
     } else {
       const auto& wish = std::get<CommandMessage>(*said);
-      Command command;
+      SegmentCommand command;
       command.kind = static_cast<CommandKind>(wish.kind);
       command.argument = wish.argument;
       static_cast<void>(is_valid(command, {.tools = 3}));

@@ -43,8 +43,8 @@ std::uint16_t u16_at(const std::uint8_t* data) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::vector<std::byte> good = good_segment();
   static std::vector<std::byte> patched = good;
-  if (size >= sizeof(kerf::Command)) {
-    kerf::Command command;
+  if (size >= sizeof(kerf::SegmentCommand)) {
+    kerf::SegmentCommand command;
     std::memcpy(&command, data, sizeof command);
     static_cast<void>(kerf::is_valid(command, {.tools = 3, .arms = 2}));
   }

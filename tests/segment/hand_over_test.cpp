@@ -50,8 +50,8 @@ int status_of(pid_t child) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-Command select(std::uint32_t tool) {
-  Command command;
+SegmentCommand select(std::uint32_t tool) {
+  SegmentCommand command;
   command.kind = CommandKind::select_tool;
   command.argument = tool;
   return command;
@@ -194,7 +194,7 @@ TEST_CASE("a reply that comes too late is not taken for that of the next command
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   std::promise<void> go_on;
   // Of a server that hangs at the first command: it refuses the first and accepts all others.
-  const SegmentServer server("demo", writer.fd(), 1, [&](const Command& command) -> Reply {
+  const SegmentServer server("demo", writer.fd(), 1, [&](const SegmentCommand& command) -> Reply {
     if (command.argument != 0) return {ReplyStatus::accepted, command.argument};
     go_on.get_future().wait();
     return {ReplyStatus::refused, 0};
@@ -216,17 +216,17 @@ TEST_CASE("commands outside the limits are refused before they reach the servo")
   SegmentServer server("demo", writer, CommandLimits{.tools = 2});
   SegmentConnection connection = connect_segment("demo");
   CHECK(connection.send(select(2)).status == ReplyStatus::refused);
-  Command hold;
+  SegmentCommand hold;
   hold.argument = 2;
   CHECK(connection.send(hold).status == ReplyStatus::refused);
   hold.argument = 1;
   hold.reserved[2] = 1;
   CHECK(connection.send(hold).status == ReplyStatus::refused);
-  Command reset;
+  SegmentCommand reset;
   reset.kind = CommandKind::reset;
   reset.argument = 1;
   CHECK(connection.send(reset).status == ReplyStatus::refused);
-  Command unknown;
+  SegmentCommand unknown;
   unknown.kind = static_cast<CommandKind>(77);
   CHECK(connection.send(unknown).status == ReplyStatus::refused);
   CHECK(!server.take_command());

@@ -317,7 +317,7 @@ TEST_CASE("a mirror is handed over like a segment, and somebody else answers its
   const Remote remote(writer);
   ReplicaWriter mirror = ReplicaWriter::create(remote.spec());
   remote.copy_to(mirror);
-  SegmentServer server("far", mirror.fd(), mirror.session_id(), [](const Command& command) {
+  SegmentServer server("far", mirror.fd(), mirror.session_id(), [](const SegmentCommand& command) {
     return command.argument == 3 ? Reply{ReplyStatus::accepted, 42} : Reply{ReplyStatus::busy, 0};
   });
   SegmentConnection connection = connect_segment("far");

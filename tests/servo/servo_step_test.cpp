@@ -132,12 +132,11 @@ TEST_CASE("the tool changes at a tick boundary, to a known index only") {
   scene.tools.push_back(ball(10));
   ArmedServo armed(scene);
   const double large_n = armed.settled(0, 0.4, 0).force_n[1];
-  using Command = ServoCommand;
-  armed.servo->apply({Command::Kind::select_tool, 1});
+  armed.servo->apply({ServoCommand::Kind::select_tool, 1});
   const ServoOutput out = armed.settled(0, 0.4, 0);
   CHECK(out.active_tool == 1);
   CHECK(out.force_n[1] < 0.8 * large_n);
-  armed.servo->apply({Command::Kind::select_tool, 2});
+  armed.servo->apply({ServoCommand::Kind::select_tool, 2});
   CHECK(armed.settled(0, 0.4, 0).active_tool == 1);
 }
 

@@ -47,21 +47,21 @@ std::string sheet_json() {
 }
 
 /// `kerf-studies burs`: the heads that a scene can name by their ISO number, and a drawing of them.
-class Command final : public LabCommand {
+class BursCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit BursCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
   std::string svg_;
 };
 
-Command::Command(Arguments& program)
+BursCommand::BursCommand(Arguments& program)
     : LabCommand(program, "burs", "the burs that a scene can name by their ISO number") {
   app_.option("--svg", svg_, "draw them, at their usual sizes").shown_as("FILE");
 }
 
-int Command::run(std::ostream& out) const {
+int BursCommand::run(std::ostream& out) const {
   check_outputs({}, {{"--svg", svg_, ".svg"}});
   for (const BurHead& head : kBurHeads) {
     out << format("%.3s  %-14s %-14s %03d to %03d\n", head.number.data(), head.name.data(),
@@ -78,5 +78,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::burs
 
 std::unique_ptr<kerf::LabCommand> kerf::make_burs_command(Arguments& program) {
-  return std::make_unique<burs::Command>(program);
+  return std::make_unique<burs::BursCommand>(program);
 }

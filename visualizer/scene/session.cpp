@@ -270,7 +270,7 @@ bool Session::ended_cleanly() const noexcept {
 
 bool Session::send(CommandKind kind, std::uint32_t argument) {
   try {
-    const Command command{.kind = kind, .index = 0, .argument = argument};
+    const SegmentCommand command{.kind = kind, .index = 0, .argument = argument};
     return connection_.send(command).status == ReplyStatus::accepted;
   } catch (const SegmentError&) {
     return false;  // it has gone; the picture reports it

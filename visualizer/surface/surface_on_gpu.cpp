@@ -319,8 +319,8 @@ void SurfaceOnGpu::draw(const VolumeSurface& surface, const FrustumCulling& cull
   of_picked_.clear();
   for (const auto& [distance_2, id, all] : seen_) {
     const Part& part = parts_[id];
-    Command command{part.count * kIndices, 1, part.triangles.first * kIndices, part.vertices.first,
-                    id};
+    DrawCommand command{part.count * kIndices, 1, part.triangles.first * kIndices,
+                        part.vertices.first, id};
     if (!all) {
       const std::size_t before = picked_.size();
       culling.append_visible(surface.meshes()[id], part.bounds, surface.block(id), picked_);
@@ -334,8 +334,8 @@ void SurfaceOnGpu::draw(const VolumeSurface& surface, const FrustumCulling& cull
   if (commands_.empty()) return;
   upload_picked();
   glNamedBufferData(command_buffer_.id(),
-                    static_cast<GLsizeiptr>(commands_.size() * sizeof(Command)), commands_.data(),
-                    GL_STREAM_DRAW);
+                    static_cast<GLsizeiptr>(commands_.size() * sizeof(DrawCommand)),
+                    commands_.data(), GL_STREAM_DRAW);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, command_buffer_.id());
   glBindVertexArray(array_.id());
   glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_SHORT, nullptr,

@@ -140,7 +140,7 @@ class SurfaceOnGpu {
     BlockBounds bounds;
   };
   /// As GL reads it (DrawElementsIndirectCommand).
-  struct Command {
+  struct DrawCommand {
     std::uint32_t indices, instances, first_index, base_vertex, base_instance;
   };
 
@@ -166,7 +166,7 @@ class SurfaceOnGpu {
   GrowingBuffer triangles_;
   GlBuffer starts_ = GlBuffer::create();  ///< block indices, the instance attribute
   std::vector<Seen> seen_;                ///< front to back
-  std::vector<Command> commands_;
+  std::vector<DrawCommand> commands_;
   std::vector<BlockTriangle> picked_;   ///< of blocks that are not drawn whole
   std::vector<std::size_t> of_picked_;  ///< commands that draw them
   RangePool::Range picked_range_;

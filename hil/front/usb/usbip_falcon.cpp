@@ -32,7 +32,7 @@ void put_word(Header& out, std::size_t at, std::uint32_t value) noexcept {
     out[at + i] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
 }
 /// An answer has neither device, direction nor endpoint, and begins its own part at byte 20.
-Header answer(Command command, std::uint32_t sequence, int status) noexcept {
+Header answer(UsbipCommand command, std::uint32_t sequence, int status) noexcept {
   Header out{};
   put_word(out, 0, static_cast<std::uint32_t>(command));
   put_word(out, 4, sequence);
@@ -42,11 +42,11 @@ Header answer(Command command, std::uint32_t sequence, int status) noexcept {
 
 Request decode(std::span<const std::uint8_t, kHeaderBytes> in) noexcept {
   Request request;
-  request.command = static_cast<Command>(word(in, 0));
+  request.command = static_cast<UsbipCommand>(word(in, 0));
   request.sequence = word(in, 4);
   request.to_host = word(in, 12) != 0;
   request.endpoint = word(in, 16);
-  if (request.command == Command::unlink) {
+  if (request.command == UsbipCommand::unlink) {
     request.unlinks = word(in, 20);
   } else {
     request.bytes = word(in, 24);
@@ -57,13 +57,13 @@ Request decode(std::span<const std::uint8_t, kHeaderBytes> in) noexcept {
 
 /// The end of a transfer: `status` 0 or a negative errno; to the host, its bytes follow.
 Header submitted(std::uint32_t sequence, int status, std::uint32_t bytes) noexcept {
-  Header out = answer(Command::submitted, sequence, status);
+  Header out = answer(UsbipCommand::submitted, sequence, status);
   put_word(out, 24, bytes);
   return out;
 }
 /// The answer to an unlink: -ECONNRESET if the transfer was given up, 0 if it was over.
 Header unlinked(std::uint32_t sequence, int status) noexcept {
-  return answer(Command::unlinked, sequence, status);
+  return answer(UsbipCommand::unlinked, sequence, status);
 }
 
 }  // namespace
@@ -130,9 +130,9 @@ bool UsbipFalcon::take_message() {
 }
 
 void UsbipFalcon::serve(const usbip::Request& request, std::span<const std::uint8_t> bytes) {
-  using usbip::Command;
-  if (request.command == Command::unlink) return unlink(request);
-  if (request.command != Command::submit) return lose_host();
+  using usbip::UsbipCommand;
+  if (request.command == UsbipCommand::unlink) return unlink(request);
+  if (request.command != UsbipCommand::submit) return lose_host();
   if (request.endpoint == 0) return submit_control(request);
   if (request.to_host && request.endpoint == (falcon::kEndpointIn & kEndpointNumber)) {
     if (reads_.size() == kMostReads) return say(usbip::submitted(request.sequence, -ENOMEM, 0));

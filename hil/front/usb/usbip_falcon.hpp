@@ -23,11 +23,11 @@ inline constexpr std::size_t kHeaderBytes = 48;
 using Header = std::array<std::uint8_t, kHeaderBytes>;
 
 /// First word of a message: two that the host sends, and their answers.
-enum class Command : std::uint32_t { submit = 1, unlink = 2, submitted = 3, unlinked = 4 };
+enum class UsbipCommand : std::uint32_t { submit = 1, unlink = 2, submitted = 3, unlinked = 4 };
 
 /// A request of the host.
 struct Request {
-  Command command{};
+  UsbipCommand command{};
   std::uint32_t sequence = 0;
   bool to_host = false;
   std::uint32_t endpoint = 0;  ///< its number, without the direction

@@ -171,14 +171,14 @@ class AgingDevice final : public kerf::PacketDevice {
 };
 
 /// 300 ticks of commands with their number; from 100 on the device takes nothing for a while.
-template <class Command>
+template <class CommandOfTick>
 void send_ticks(PacketPort& port, kerf::test::HeldClock& clock, AgingDevice& device,
-                std::atomic<bool>& streams, Command command) {
+                std::atomic<bool>& streams, CommandOfTick command_of) {
   clock.hold();
   for (std::int16_t tick = 1; tick <= 300; ++tick) {
     device.newest = tick;
     const std::uint64_t sent = kerf::test::commands_sent(port);
-    CHECK(port.send(command(tick)));
+    CHECK(port.send(command_of(tick)));
     streams = tick >= 100;
     kerf::test::wait_for_command(port, sent, 10);
     clock.pass(1'000'000);

@@ -140,9 +140,9 @@ class Table {
 
 /// `kerf-studies bridge`, which `./kerf bench bridge` is: how late the picture on a second machine
 /// is, over links that lose, delay and throttle packets, and its cost.
-class Command final : public LabCommand {
+class TwoMachinesCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit TwoMachinesCommand(Arguments& program);
   /// 77 if this machine forbids network namespaces.
   [[nodiscard]] int run(std::ostream& out) const override;
 
@@ -154,7 +154,7 @@ class Command final : public LabCommand {
   std::string page_;
 };
 
-Command::Command(Arguments& program)
+TwoMachinesCommand::TwoMachinesCommand(Arguments& program)
     : LabCommand(program, "bridge", "the picture on a second machine, over good and bad links") {
   app_.option("--seconds", seconds_, "that a link is looked at").within(1, 3600).shows_default();
   app_.option("--seed", seed_, "of the packets that are lost").shows_default();
@@ -171,7 +171,7 @@ Command::Command(Arguments& program)
       "machine forbids network namespaces or TUN devices.");
 }
 
-int Command::run(std::ostream& out) const {
+int TwoMachinesCommand::run(std::ostream& out) const {
   const LabOutput page("--page", page_, ".md");
   try {
     enter_user_namespace();
@@ -200,5 +200,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::two_machines
 
 std::unique_ptr<kerf::LabCommand> kerf::make_bridge_command(Arguments& program) {
-  return std::make_unique<two_machines::Command>(program);
+  return std::make_unique<two_machines::TwoMachinesCommand>(program);
 }

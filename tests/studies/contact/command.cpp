@@ -166,9 +166,9 @@ std::string json_of(const Findings& findings) {
 }
 
 /// `kerf-studies extremes`: the swept contact against its limits, and beside the paper's force.
-class Command final : public LabCommand {
+class ContactCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit ContactCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
@@ -178,7 +178,7 @@ class Command final : public LabCommand {
   int core_ = -1, presses_ = 0, seed_ = 0;
 };
 
-Command::Command(Arguments& program)
+ContactCommand::ContactCommand(Arguments& program)
     : LabCommand(program, "extremes", "the swept contact against its limits, beside the paper's") {
   std::vector<std::string> names;
   for (const Group& group : kGroups) names.emplace_back(group.name);
@@ -200,7 +200,7 @@ Command::Command(Arguments& program)
   app_.footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
 }
 
-int Command::run(std::ostream& out) const {
+int ContactCommand::run(std::ostream& out) const {
   const LabOutput as_json("--report", report_, ".json");
   const LabOutput as_page("--page", page_, ".md");
   const std::string plot = page_plot("--page", page_, ".svg"),
@@ -243,5 +243,5 @@ int Command::run(std::ostream& out) const {
 }  // namespace kerf::extremes
 
 std::unique_ptr<kerf::LabCommand> kerf::make_extremes_command(Arguments& program) {
-  return std::make_unique<extremes::Command>(program);
+  return std::make_unique<extremes::ContactCommand>(program);
 }

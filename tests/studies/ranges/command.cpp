@@ -167,9 +167,9 @@ void print_one(const KeyTexts& texts, const StudySize& effort, RowPrinter& print
 }
 
 /// `kerf-studies ranges`: the servo at the ends of all settings, judged by rule.
-class Command final : public LabCommand {
+class RangesCommand final : public LabCommand {
  public:
-  explicit Command(Arguments& program);
+  explicit RangesCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
@@ -181,7 +181,7 @@ class Command final : public LabCommand {
   double hours_ = 0;
 };
 
-Command::Command(Arguments& program)
+RangesCommand::RangesCommand(Arguments& program)
     : LabCommand(program, "ranges", "the servo at the ends of all that can be set, by rule") {
   app_.option("--combinations", combinations_,
               "of keys at their ends, at least; 0: no key and no pair")
@@ -202,7 +202,7 @@ Command::Command(Arguments& program)
   app_.footer("Exit codes: 0 no rule is broken, 1 one is, 2 bad input or set-up, 130 interrupted.");
 }
 
-int Command::run(std::ostream& out) const {
+int RangesCommand::run(std::ostream& out) const {
   catch_stop_signals();
   try {
     return study(out);
@@ -214,7 +214,7 @@ int Command::run(std::ostream& out) const {
   return 130;
 }
 
-int Command::study(std::ostream& out) const {
+int RangesCommand::study(std::ostream& out) const {
   StudySize effort;
   for (std::size_t i = 0; i < kNumericWords.size(); ++i) {
     const bool wanted =
@@ -265,5 +265,5 @@ int Command::study(std::ostream& out) const {
 }  // namespace kerf::ranges
 
 std::unique_ptr<kerf::LabCommand> kerf::make_ranges_command(Arguments& program) {
-  return std::make_unique<ranges::Command>(program);
+  return std::make_unique<ranges::RangesCommand>(program);
 }
