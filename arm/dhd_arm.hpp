@@ -86,11 +86,9 @@ class DhdArm final : public VendorArm {
   void start() override;
   void stop() override;
   void close() override;
-  [[nodiscard]] Facts facts() const override { return facts_; }
   [[nodiscard]] std::vector<std::string> warnings() const override;
   [[nodiscard]] std::string text_of(std::uint32_t failure) const override;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
-  [[nodiscard]] const char* notice() const noexcept override { return notice_.load(); }
   /// True if the device's own watchdog is set. After `open`.
   [[nodiscard]] bool has_watchdog() const noexcept { return has_watchdog_; }
 
@@ -109,12 +107,10 @@ class DhdArm final : public VendorArm {
   ArmExchange& exchange_;
   VendorLibrary library_;
   dhd::Calls calls_{};
-  Facts facts_;
   char id_ = 0;
   int type_ = 0;  ///< dhdGetSystemType
   bool is_open_ = false, has_watchdog_ = false;
   std::jthread thread_;
-  std::atomic<const char*> notice_{""};
   // Used by that thread only, until `stop`.
   int unread_ = 0;            ///< consecutive positions that could not be read
   std::int64_t read_ns_ = 0;  ///< when the last one was read; before that, the first try

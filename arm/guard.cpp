@@ -47,17 +47,27 @@ void make_last_words() noexcept {
   }
 }
 
+/// A message of bytes and one socket, as sendmsg and recvmsg take it.
+struct SocketMessage {
+  SocketMessage(char* bytes, std::size_t size) noexcept : part{bytes, size} {
+    header.msg_iov = &part;
+    header.msg_iovlen = 1;
+    header.msg_control = control.data();
+    header.msg_controllen = control.size();
+  }
+  SocketMessage(const SocketMessage&) = delete;
+  SocketMessage& operator=(const SocketMessage&) = delete;
+
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  iovec part;
+  msghdr header{};
+};
+
 /// Takes what lies there, oldest first; false if nothing does. The socket is the caller's.
 bool take_last_word(int& socket, std::array<char, 512>& bytes, std::size_t& size) noexcept {
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
-  iovec part{bytes.data(), bytes.size()};
-  msghdr message{};
-  message.msg_iov = &part;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  const ssize_t got = recvmsg(last_words.read, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
-  const cmsghdr* const head = CMSG_FIRSTHDR(&message);
+  SocketMessage message(bytes.data(), bytes.size());
+  const ssize_t got = recvmsg(last_words.read, &message.header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+  const cmsghdr* const head = CMSG_FIRSTHDR(&message.header);
   if (got <= 0 || head == nullptr || head->cmsg_type != SCM_RIGHTS) return false;
   std::memcpy(&socket, CMSG_DATA(head), sizeof socket);
   size = static_cast<std::size_t>(got);
@@ -173,19 +183,13 @@ void leave_last_word(int socket, std::string_view bytes) noexcept {
   while (take_last_word(former, ignored, size)) close(former);
   if (socket < 0 || bytes.empty() || bytes.size() > ignored.size()) return;
   std::copy(bytes.begin(), bytes.end(), ignored.begin());
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
-  iovec part{ignored.data(), bytes.size()};
-  msghdr message{};
-  message.msg_iov = &part;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  cmsghdr* const head = CMSG_FIRSTHDR(&message);
+  SocketMessage message(ignored.data(), bytes.size());
+  cmsghdr* const head = CMSG_FIRSTHDR(&message.header);
   head->cmsg_level = SOL_SOCKET;
   head->cmsg_type = SCM_RIGHTS;
   head->cmsg_len = CMSG_LEN(sizeof socket);
   std::memcpy(CMSG_DATA(head), &socket, sizeof socket);
-  static_cast<void>(sendmsg(last_words.write, &message, MSG_DONTWAIT | MSG_NOSIGNAL));
+  static_cast<void>(sendmsg(last_words.write, &message.header, MSG_DONTWAIT | MSG_NOSIGNAL));
 }
 
 void end_is_told() noexcept {

@@ -86,10 +86,8 @@ class HdArm final : public VendorArm {
   void start() override;
   void stop() override;
   void close() override;
-  [[nodiscard]] Facts facts() const override { return facts_; }
   [[nodiscard]] std::string text_of(std::uint32_t failure) const override;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
-  [[nodiscard]] const char* notice() const noexcept override { return notice_.load(); }
 
   /// One tick of the servo thread. Returns HD's code to continue or to end the callback.
   [[nodiscard]] std::uint32_t frame() noexcept;
@@ -108,14 +106,12 @@ class HdArm final : public VendorArm {
   ArmExchange& exchange_;
   VendorLibrary library_;
   hd::Calls calls_{};
-  Facts facts_;
   std::uint32_t device_ = 0;
   unsigned long scheduled_ = 0;
   bool is_open_ = false, is_started_ = false, is_scheduled_ = false;
   std::uint32_t calibration_style_ = 0;
   std::atomic<bool> owns_errors_{false};  ///< the servo thread reads the error stack
   std::atomic<bool> has_ended_{false};    ///< of the callback
-  std::atomic<const char*> notice_{""};
   // Used by the servo thread only, until `stop`.
   int clean_ = 0, unclean_ = 0;
   std::uint32_t unclean_code_ = 0;

@@ -59,11 +59,9 @@ class ServiceArm final : public VendorArm {
   void start() override;
   void stop() override;
   void close() override;
-  [[nodiscard]] Facts facts() const override { return facts_; }
   [[nodiscard]] std::string text_of(std::uint32_t failure) const override;
   /// `errors` are these counters.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
-  [[nodiscard]] const char* notice() const noexcept override { return ""; }
 
  private:
   /// A service that answers, its events, and what was agreed.
@@ -104,7 +102,6 @@ class ServiceArm final : public VendorArm {
   Options options_;
   ArmExchange& exchange_;
   const std::atomic<bool>& stop_opening_;
-  Facts facts_;
   int lockstep_hz_ = 0;
   std::unique_ptr<Connection> connection_;
   std::uint64_t turns_ = 0;   ///< of all connections

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -27,7 +28,7 @@ class VendorArm {
 
   /// Names and versions from the library, for the report and the first line. After `open`.
   using Facts = std::vector<std::pair<std::string, std::string>>;
-  [[nodiscard]] virtual Facts facts() const = 0;
+  [[nodiscard]] const Facts& facts() const noexcept { return facts_; }
   /// Limitations of this device that the user should know, one line each. After `open`.
   [[nodiscard]] virtual std::vector<std::string> warnings() const { return {}; }
   /// The meaning of a failure of the exchange, and its remedy. Does not call the library. Main
@@ -36,7 +37,11 @@ class VendorArm {
   /// How often each error of the library occurred. After `stop`.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> errors() const = 0;
   /// What the user has to do now, such as a calibration; empty if nothing. Any thread.
-  [[nodiscard]] virtual const char* notice() const noexcept = 0;
+  [[nodiscard]] const char* notice() const noexcept { return notice_.load(); }
+
+ protected:
+  Facts facts_;
+  std::atomic<const char*> notice_{""};  ///< of static storage
 };
 
 }  // namespace kerf

@@ -96,7 +96,7 @@ struct Hand::Parts {
   HandScript played;
   Emulator emulator;
   FaultyDevice faulty;
-  LockStepPort port;
+  DirectLockStepPort port;
   std::unique_ptr<DeviceDriver> driver;
 };
 

@@ -144,7 +144,7 @@ struct TabRun::State {
   std::unique_ptr<CompiledScene> servo;
   SegmentWriter writer;
   Emulator emulator;
-  LockStepPort port;
+  DirectLockStepPort port;
   std::unique_ptr<DeviceDriver> driver;
   TabViewer viewer;
   Publisher publisher;

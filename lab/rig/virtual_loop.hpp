@@ -1,58 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <memory>
-#include <span>
-#include <utility>
-#include <vector>
 
 #include "controller/device/device_driver.hpp"
 #include "controller/device/port/packet_port.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "hil/device/packet_device.hpp"
+#include "lab/rig/direct_port.hpp"
 
 /// A device, its driver and the servo step in one process and in virtual time.
 namespace kerf {
-
-/// The port to an emulated device in the same process. `device` outlives it.
-class DirectPort final : public PacketPort {
- public:
-  explicit DirectPort(PacketDevice& device) : device_(device) {}
-
-  /// One bus cycle of the device; its packets wait here.
-  void cycle() {
-    device_.advance(1);
-    for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
-      waiting_.emplace_back(packet.begin(), packet.end());
-    }
-  }
-
-  std::size_t receive(std::span<std::uint8_t> out) noexcept override {
-    if (waiting_.empty()) return 0;
-    const std::vector<std::uint8_t> packet = std::move(waiting_.front());
-    waiting_.pop_front();
-    std::copy_n(packet.begin(), std::min(packet.size(), out.size()), out.begin());
-    return packet.size();
-  }
-  bool send(std::span<const std::uint8_t> packet) noexcept override {
-    device_.receive(packet);
-    return true;
-  }
-  [[nodiscard]] bool closed() const noexcept override {
-    return waiting_.empty() && device_.hung_up();
-  }
-  [[nodiscard]] bool wait(int) noexcept override { return !waiting_.empty(); }
-
- private:
-  PacketDevice& device_;
-  std::deque<std::vector<std::uint8_t>> waiting_;
-};
 
 /// The loop of a controller whose clock is that of the device: bus cycles, and a servo step after
 /// the last cycle of each tick. The rate of the scene divides that of the bus.
