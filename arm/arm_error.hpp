@@ -12,7 +12,7 @@ namespace kerf {
 inline constexpr const char* kUnplug =
     "; unplug the device, plug it in again, and see whether the vendor's own program runs";
 
-/// Bad input, or a vendor's library or device that cannot be used. One line: `place: value;
+/// Bad input, or a vendor's library or device that cannot be used. One line: `location: value;
 /// remedy`; line breaks in texts of the library are removed. The only exception type of `arm`; the
 /// program prints it after its name and ends with exit code 2.
 class ArmError : public std::runtime_error {

@@ -69,7 +69,7 @@ HostPort parse_service(std::string_view text) {
 ServiceArm::ServiceArm(const Options& options, ArmExchange& exchange, const std::atomic<bool>& stop)
     : options_(options), exchange_(exchange), stop_opening_(stop) {}
 
-std::string ServiceArm::place() const {
+std::string ServiceArm::location() const {
   return "--service " + options_.service.host + ":" + std::to_string(options_.service.port);
 }
 
@@ -170,13 +170,13 @@ void ServiceArm::open() {
       use(connect(stop_opening_));
       break;
     } catch (const Refusal& refusal) {
-      throw ArmError(place() + ": " + refusal.what());
+      throw ArmError(location() + ": " + refusal.what());
     } catch (const std::runtime_error& error) {
       if (stop_opening_) return;
       if (monotonic_ns() >= give_up_ns) {
         const std::string why = error.what();
         const bool has_way_out = why.find(';') != std::string::npos;
-        throw ArmError(place() + ": " + why + (has_way_out ? "" : std::string("; ") + kNeeds));
+        throw ArmError(location() + ": " + why + (has_way_out ? "" : std::string("; ") + kNeeds));
       }
     }
     sleep_until_ns(std::min(monotonic_ns() + 50 * kNsPerMs, give_up_ns));
@@ -197,10 +197,10 @@ void ServiceArm::prove() {
     constexpr std::int64_t kPauseNs = 5 * kNsPerMs;
     if (!in_lockstep() && turn > 0) sleep_until_ns(sent_ns_ + kPauseNs);
     if (play_turn() == Turn::lost) {
-      throw ArmError(place() + ": " + why_lost_);
+      throw ArmError(location() + ": " + why_lost_);
     }
     const Bar bar = connection_->turns.session().bar();
-    if (is_final(bar)) throw ArmError(place() + ": " + inverse3::text_of(bar));
+    if (is_final(bar)) throw ArmError(location() + ": " + inverse3::text_of(bar));
     if (bar != Bar::proving && bar != Bar::parking) break;
   }
 }
@@ -221,22 +221,22 @@ void ServiceArm::close() {
 }
 
 void ServiceArm::fail(const std::string& why) noexcept {
-  failure_ = place() + ": " + why;
+  failure_ = location() + ": " + why;
   exchange_.fail(kRefused);
 }
 
 std::string ServiceArm::text_of(std::uint32_t failure) const {
   if (failure == kRefused) return failure_;
   return failure == ArmExchange::kStalled
-             ? place() + ": no turn has ended for long; see what else this machine does"
-             : place() + ": no reply has a position of the device; see the vendor's Hub";
+             ? location() + ": no turn has ended for long; see what else this machine does"
+             : location() + ": no reply has a position of the device; see the vendor's Hub";
 }
 
 /// Left out if the terminal or pipe takes nothing: no force may wait for its reader.
 void ServiceArm::note(const std::string& text) const noexcept {
   pollfd error_stream{STDERR_FILENO, POLLOUT, 0};
   if (poll(&error_stream, 1, 0) != 1 || (error_stream.revents & POLLOUT) == 0) return;
-  std::fprintf(stderr, "kerf-arm: warning: %s: %s\n", place().c_str(), one_line(text).c_str());
+  std::fprintf(stderr, "kerf-arm: warning: %s: %s\n", location().c_str(), one_line(text).c_str());
 }
 
 void ServiceArm::note_once(bool& is_noted, const std::string& text) const noexcept {

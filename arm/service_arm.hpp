@@ -97,7 +97,7 @@ class ServiceArm final : public VendorArm {
   [[nodiscard]] std::int64_t wait_ns() const noexcept;
   /// Time of the turns.
   [[nodiscard]] std::int64_t now_ns() const noexcept;
-  [[nodiscard]] std::string place() const;
+  [[nodiscard]] std::string location() const;
 
   Options options_;
   ArmExchange& exchange_;

@@ -22,7 +22,7 @@ WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--
 
 
 class Refusal(Exception):
-    """Bad input or set-up: `place: value; remedy`. Ends the demo with exit code 2."""
+    """Bad input or set-up: `location: value; remedy`. Ends the demo with exit code 2."""
 
 
 @dataclasses.dataclass

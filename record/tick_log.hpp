@@ -20,7 +20,7 @@
 
 namespace kerf {
 
-/// A recording that cannot be written or read. One line: "place: value; remedy".
+/// A recording that cannot be written or read. One line: "location: value; remedy".
 class RecordError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

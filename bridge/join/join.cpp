@@ -176,8 +176,8 @@ constexpr std::uint64_t kMaxWelcomeBytes = 256 * 1024;
 [[nodiscard]] BridgeAddress address_in(const JoinOptions& options) {
   BridgeAddress out = parse_address(options.address);
   if (options.token_file.empty()) return out;
-  const std::string place = "--token-file " + options.token_file.string() + ": ";
-  if (!out.token.empty()) throw BridgeError(place + "the address has a token; give one of both");
+  const std::string location = "--token-file " + options.token_file.string() + ": ";
+  if (!out.token.empty()) throw BridgeError(location + "the address has a token; give one of both");
   Tokens tokens;
   tokens.add_file(options.token_file, "--token-file", Right::look);
   out.token = tokens.first();
@@ -248,7 +248,7 @@ class Joiner {
   /// A reason is printed once, not with every try.
   void lost(const std::string& reason) {
     if (std::exchange(last_reason_, reason) != reason) {
-      say(place() + reason + "; trying again");
+      say(location() + reason + "; trying again");
     }
   }
 
@@ -259,12 +259,12 @@ class Joiner {
       try {
         co_await follow(WebSocket(tcp::socket(io_), address_.secure ? &tls_ : nullptr));
       } catch (const Outdated& error) {
-        throw BridgeError(place() + error.what());
+        throw BridgeError(location() + error.what());
       } catch (const Hopeless& error) {
-        if (joins_ == 0) throw BridgeError(place() + error.what());
+        if (joins_ == 0) throw BridgeError(location() + error.what());
         lost(error.what());
       } catch (const WireError& error) {  // another try would receive the same
-        if (joins_ == 0) throw BridgeError(place() + error.what());
+        if (joins_ == 0) throw BridgeError(location() + error.what());
         lost(error.what());
       } catch (const SegmentError&) {
         if (joins_ == 0) throw;
@@ -325,7 +325,7 @@ class Joiner {
     }
   }
 
-  [[nodiscard]] std::string place() const { return address_.host_and_port() + ": "; }
+  [[nodiscard]] std::string location() const { return address_.host_and_port() + ": "; }
 
   /// Handles one message of the server. Returns the ack to send, if any.
   std::optional<AckMessage> take(std::span<const std::byte> message, int socket) {
@@ -397,7 +397,7 @@ class Joiner {
     return view_message(who, views_.view());
   }
   void say_view(const std::string& line) {
-    if (std::exchange(last_of_views_, line) != line) say(place() + line);
+    if (std::exchange(last_of_views_, line) != line) say(location() + line);
   }
 
   void report_joined() {
@@ -421,7 +421,7 @@ class Joiner {
         co_return;
       }
       if (joins_ == 0 && wait_s_ && static_cast<double>(now_ns - began_ns) > *wait_s_ * 1e9) {
-        throw BridgeError(place() + (last_reason_.empty() ? "no picture" : last_reason_) +
+        throw BridgeError(location() + (last_reason_.empty() ? "no picture" : last_reason_) +
                           format("; gave up after %g s (--wait)", *wait_s_));
       }
       if (link_ != nullptr && connected_ && !greeted_ && now_ns - heard_ns_ > kSayWaitNs) {

@@ -8,7 +8,7 @@
 
 namespace kerf::bridge {
 
-/// Ends the program at start: one line "place: value; way out".
+/// Ends the program at start: one line "location: value; way out".
 struct BridgeError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

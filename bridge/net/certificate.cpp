@@ -35,18 +35,18 @@ void require(bool done, const char* step) {
 /// `--cert FILE: `, after a check that OpenSSL can read the file: it would wait for a pipe that no
 /// program writes to.
 std::string readable(const char* option, const std::filesystem::path& file) {
-  const std::string place = std::string(option) + " " + file.string() + ": ";
+  const std::string location = std::string(option) + " " + file.string() + ": ";
   if (access(file.c_str(), R_OK) != 0) {
-    throw BridgeError(place + std::strerror(errno) + "; name a PEM file");
+    throw BridgeError(location + std::strerror(errno) + "; name a PEM file");
   }
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) {
     throw BridgeError(
-        place +
+        location +
         (std::filesystem::is_directory(file, error) ? "is a folder" : "is no regular file") +
         "; name a PEM file");
   }
-  return place;
+  return location;
 }
 
 /// In capitals, a colon between bytes; at most a digest.
@@ -73,9 +73,9 @@ std::string text_of(const ASN1_TIME* time) {
 
 /// Trusts the certificates of a PEM file, at least one.
 void load_ca(SSL_CTX* tls, const char* option, const std::filesystem::path& file) {
-  const std::string place = readable(option, file);
+  const std::string location = readable(option, file);
   if (SSL_CTX_load_verify_file(tls, file.c_str()) == 1) return;
-  throw BridgeError(place + "no certificate in PEM form (" + openssl_reason() + "); " + kHelp);
+  throw BridgeError(location + "no certificate in PEM form (" + openssl_reason() + "); " + kHelp);
 }
 
 }  // namespace
@@ -91,15 +91,15 @@ Tls new_tls() {
 
 void show_certificate(SSL_CTX* tls, const std::filesystem::path& certificate,
                       const std::filesystem::path& key) {
-  const std::string place = readable("--cert", certificate);
-  const std::string key_place = readable("--key", key);
+  const std::string location = readable("--cert", certificate);
+  const std::string key_location = readable("--key", key);
   struct stat status {};
   if (stat(key.c_str(), &status) == 0 && (status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    throw BridgeError(key_place + "is open to other users; chmod 600 it");
+    throw BridgeError(key_location + "is open to other users; chmod 600 it");
   }
   ERR_clear_error();
   if (SSL_CTX_use_certificate_chain_file(tls, certificate.c_str()) != 1) {
-    throw BridgeError(place + "no certificate in PEM form (" + openssl_reason() + "); " + kHelp);
+    throw BridgeError(location + "no certificate in PEM form (" + openssl_reason() + "); " + kHelp);
   }
   // No user is there who could type a password.
   SSL_CTX_set_default_passwd_cb(tls, [](char*, int, int, void*) { return -1; });
@@ -109,24 +109,24 @@ void show_certificate(SSL_CTX* tls, const std::filesystem::path& certificate,
       &EVP_PKEY_free);
   if (own == nullptr) {
     ERR_clear_error();
-    throw BridgeError(key_place +
+    throw BridgeError(key_location +
                       "no private key in PEM form, or one with a password; openssl pkey "
                       "-in FILE -out FILE writes one without");
   }
   X509* const shown = SSL_CTX_get0_certificate(tls);
   if (X509_check_private_key(shown, own.get()) != 1) {
     ERR_clear_error();
-    throw BridgeError(key_place + "is not the key of the first certificate in " +
+    throw BridgeError(key_location + "is not the key of the first certificate in " +
                       certificate.string() + "; give the two files that were made together");
   }
   require(SSL_CTX_use_PrivateKey(tls, own.get()) == 1, "taking its key");
   if (X509_cmp_current_time(X509_get0_notAfter(shown)) < 0) {
-    throw BridgeError(place + "the certificate ended on " + text_of(X509_get0_notAfter(shown)) +
+    throw BridgeError(location + "the certificate ended on " + text_of(X509_get0_notAfter(shown)) +
                       "; make another: " + kHelp);
   }
   if (X509_cmp_current_time(X509_get0_notBefore(shown)) > 0) {
-    throw BridgeError(place + "the certificate holds from " + text_of(X509_get0_notBefore(shown)) +
-                      " on; is the clock right?");
+    throw BridgeError(location + "the certificate holds from " +
+                      text_of(X509_get0_notBefore(shown)) + " on; is the clock right?");
   }
 }
 

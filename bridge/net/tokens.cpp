@@ -45,11 +45,11 @@ constexpr std::size_t kMaxTokens = 256;
 }
 
 /// The text of a file or a pipe. No pipe is waited for without end.
-std::string text_of(const std::filesystem::path& file, const std::string& place) {
+std::string text_of(const std::filesystem::path& file, const std::string& location) {
   constexpr int kPatienceMs = 2000;
   constexpr std::size_t kMostBytes = 1 << 20;
   const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-  if (fd < 0) throw BridgeError(place + std::strerror(errno) + "; let this user read it");
+  if (fd < 0) throw BridgeError(location + std::strerror(errno) + "; let this user read it");
   std::string text;
   std::array<char, 4096> part;
   ssize_t bytes = 0;
@@ -59,8 +59,8 @@ std::string text_of(const std::filesystem::path& file, const std::string& place)
     text.append(part.data(), static_cast<std::size_t>(std::max<ssize_t>(bytes, 0)));
   } while (bytes > 0 && text.size() <= kMostBytes);
   ::close(fd);
-  if (bytes < 0) throw BridgeError(place + "nobody writes into this pipe; name a file");
-  if (bytes > 0) throw BridgeError(place + "more than 1 MiB; write one token a line into it");
+  if (bytes < 0) throw BridgeError(location + "nobody writes into this pipe; name a file");
+  if (bytes > 0) throw BridgeError(location + "more than 1 MiB; write one token a line into it");
   return text;
 }
 
@@ -94,18 +94,18 @@ Digest digest_of(std::string_view text) noexcept {
 }
 
 void Tokens::add_file(const std::filesystem::path& file, const char* option, Right right) {
-  const std::string place = std::string(option) + " " + file.string() + ": ";
+  const std::string location = std::string(option) + " " + file.string() + ": ";
   struct stat status {};
   if (stat(file.c_str(), &status) != 0) {
-    throw BridgeError(place + std::strerror(errno) + "; write one token a line into it");
+    throw BridgeError(location + std::strerror(errno) + "; write one token a line into it");
   }
   if (S_ISDIR(status.st_mode)) {
-    throw BridgeError(place + "is a folder; name a file with one token a line");
+    throw BridgeError(location + "is a folder; name a file with one token a line");
   }
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    throw BridgeError(place + "is open to other users; chmod 600 it");
+    throw BridgeError(location + "is open to other users; chmod 600 it");
   }
-  std::istringstream in(text_of(file, place));
+  std::istringstream in(text_of(file, location));
   const std::size_t before = entries_.size();
   std::string line;
   while (std::getline(in, line)) {
@@ -113,14 +113,14 @@ void Tokens::add_file(const std::filesystem::path& file, const char* option, Rig
     line.erase(line.find_last_not_of(" \t\r") + 1);
     if (line.empty()) continue;
     if (!is_token(line)) {
-      throw BridgeError(place + "a line of " + std::to_string(line.size()) +
+      throw BridgeError(location + "a line of " + std::to_string(line.size()) +
                         " characters is no token; take 16 to 128 letters, digits, '-' or '_'");
     }
     if (entries_.size() == kMaxTokens)
-      throw BridgeError(place + "more than 256 tokens; take fewer");
+      throw BridgeError(location + "more than 256 tokens; take fewer");
     add(line, right);
   }
-  if (entries_.size() == before) throw BridgeError(place + "no token; write one a line into it");
+  if (entries_.size() == before) throw BridgeError(location + "no token; write one a line into it");
 }
 
 void Tokens::add(std::string_view token, Right right) {

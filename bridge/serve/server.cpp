@@ -30,12 +30,13 @@ constexpr std::int64_t kRetryNs = kNsPerSecond / 10;
 constexpr std::int64_t kBbrRestartNs = 5 * kNsPerSecond;
 
 tcp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16_t port) {
-  const std::string place = "--listen " + host + ":" + std::to_string(port) + ": ";
+  const std::string location = "--listen " + host + ":" + std::to_string(port) + ": ";
   ErrorCode error;
   const auto found = tcp::resolver(io).resolve(
       host, std::to_string(port), tcp::resolver::passive | tcp::resolver::numeric_service, error);
   if (error || found.empty()) {
-    throw BridgeError(place + error.message() + "; give an address of this machine (ip address)");
+    throw BridgeError(location + error.message() +
+                      "; give an address of this machine (ip address)");
   }
   // The machine's own name may resolve to loopback too, so another address is preferred.
   const auto outside = std::find_if(found.begin(), found.end(), [](const auto& one) {
@@ -43,7 +44,7 @@ tcp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16
   });
   const tcp::endpoint at = (outside == found.end() ? found.begin() : outside)->endpoint();
   if (at.address().is_loopback() && !is_loopback(host)) {
-    throw BridgeError(place + "is " + at.address().to_string() +
+    throw BridgeError(location + "is " + at.address().to_string() +
                       ", which no other machine reaches; give an address of this machine (ip "
                       "address), or localhost");
   }
@@ -52,9 +53,9 @@ tcp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16
 
 tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
   const tcp::endpoint at = resolve(io, setup.host, setup.port);
-  const std::string place = "--listen " + setup.host + ":" + std::to_string(setup.port) + ": ";
+  const std::string location = "--listen " + setup.host + ":" + std::to_string(setup.port) + ": ";
   if (!setup.tls && !at.address().is_loopback()) {
-    throw BridgeError(place + "is " + at.address().to_string() +
+    throw BridgeError(location + "is " + at.address().to_string() +
                       ", no loopback address; off loopback there is TLS only");
   }
   tcp::acceptor acceptor(io);
@@ -70,7 +71,7 @@ tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
   if (error == boost::system::errc::address_not_available) {
     way = "give an address of this machine (ip address)";
   }
-  throw BridgeError(place + error.message() + "; " + remedy_for(error.value(), way));
+  throw BridgeError(location + error.message() + "; " + remedy_for(error.value(), way));
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ constexpr int kLookMs = 50;  // longest delay of a stop request
 
 }  // namespace
 
-void agree(PacketPort& port, const std::string& place, const LinkHello& ours, bool is_lossy,
+void agree(PacketPort& port, const std::string& location, const LinkHello& ours, bool is_lossy,
            int patience_ms, const std::atomic<bool>& stop) {
   const HelloBytes hello = encode(ours);
   const std::int64_t give_up_ns = monotonic_ns() + patience_ms * kNsPerMs;
@@ -49,14 +49,14 @@ void agree(PacketPort& port, const std::string& place, const LinkHello& ours, bo
     if (!theirs) continue;
     const std::string reason = discord(ours, *theirs);
     if (reason.empty()) return;
-    throw std::runtime_error(place + ": " + reason);
+    throw std::runtime_error(location + ": " + reason);
   }
   if (port.closed()) {
-    throw std::runtime_error(place +
+    throw std::runtime_error(location +
                              ": the emulator closed the link; see what it says, and start it with "
                              "--stay where clients come one after another");
   }
-  throw std::runtime_error(place + ": nobody answers the hello of this controller within " +
+  throw std::runtime_error(location + ": nobody answers the hello of this controller within " +
                            std::to_string(patience_ms / 1000) +
                            " s; end the client that the emulator serves, or start kerf-emulator "
                            "of this version");

@@ -18,9 +18,9 @@ namespace kerf {
 /// this side, and reads that of the emulator; earlier packets of its device are dropped.
 /// `is_lossy`: a hello may get lost, and is repeated.
 ///
-/// Throws std::runtime_error with one line, which begins with `place`, if the two do not fit, the
-/// link closes, or no answer comes for `patience_ms` or until `stop`.
-void agree(PacketPort& port, const std::string& place, const LinkHello& ours, bool is_lossy,
+/// Throws std::runtime_error with one line, which begins with `location`, if the two do not fit,
+/// the link closes, or no answer comes for `patience_ms` or until `stop`.
+void agree(PacketPort& port, const std::string& location, const LinkHello& ours, bool is_lossy,
            int patience_ms, const std::atomic<bool>& stop);
 
 /// The port that `--port` names:

@@ -17,7 +17,7 @@
 
 namespace kerf {
 
-/// A fault of a scene, a volume or a tool, as one line: `place: value; remedy`.
+/// A fault of a scene, a volume or a tool, as one line: `location: value; remedy`.
 ///
 /// The only exception of the loading code. `main` adds the program's name, prints the line and
 /// returns 2.
@@ -62,16 +62,16 @@ inline constexpr std::size_t kLongestText = 256;  // bytes of a name or a path
   return !text.empty() && text.size() <= kLongestText && one_line(text) == text;
 }
 
-/// Throws LoadError `place: what`, on one line.
-[[noreturn]] inline void refuse(std::string_view place, std::string_view what) {
-  throw LoadError(one_line(std::string(place) + std::string(what)));
+/// Throws LoadError `location: what`, on one line.
+[[noreturn]] inline void refuse(std::string_view location, std::string_view what) {
+  throw LoadError(one_line(std::string(location) + std::string(what)));
 }
 
-/// For long work of load time: throws LoadError if a signal asked the program to end. `place`:
+/// For long work of load time: throws LoadError if a signal asked the program to end. `location`:
 /// the subject of the work, mostly a file.
-inline void end_if_asked(const std::string& place) {
+inline void end_if_asked(const std::string& location) {
   if (!stop_requested()) return;
-  throw LoadError(place + ": reading it was stopped by a signal; start again");
+  throw LoadError(location + ": reading it was stopped by a signal; start again");
 }
 
 }  // namespace kerf

@@ -109,9 +109,9 @@ std::uint64_t memory_before_offer(const SandboxJob& job) {
   } catch (const LoadError& error) {
     reader.say(SandboxWord::refused, error.what());
   } catch (const std::exception& error) {
-    reader.say(SandboxWord::refused, job.place + ": " + error.what());
+    reader.say(SandboxWord::refused, job.location + ": " + error.what());
   } catch (...) {
-    reader.say(SandboxWord::refused, job.place + ": cannot be read" + kOtherFile);
+    reader.say(SandboxWord::refused, job.location + ": cannot be read" + kOtherFile);
   }
   ::_exit(0);  // without destructors and buffers, which belong to the parent
 }
@@ -120,7 +120,7 @@ std::uint64_t memory_before_offer(const SandboxJob& job) {
 class Child {
  public:
   Child(const SandboxJob& job, const std::function<void(SandboxReader&)>& read)
-      : job_(job), place_(job.place) {
+      : job_(job), location_(job.location) {
     std::array<int, 2> ends{-1, -1};
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) no_process();
     channel_ = File(ends[0]);
@@ -155,7 +155,7 @@ class Child {
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& text) const { throw LoadError(place_ + text); }
+  [[noreturn]] void refuse(const std::string& text) const { throw LoadError(location_ + text); }
 
   [[noreturn]] void no_process() const {
     refuse(": no process to read it in (" + std::generic_category().message(errno) +
@@ -184,7 +184,7 @@ class Child {
     const std::string text = escaped({reinterpret_cast<const char*>(body.data()), body.size()});
     switch (static_cast<SandboxWord>(packet[0])) {
       case SandboxWord::at:
-        place_ = text;
+        location_ = text;
         return false;
       case SandboxWord::offer:
         if (size_) break;
@@ -238,7 +238,7 @@ class Child {
 
   /// While no packet comes: signals, CPU time, progress.
   void look() {
-    end_if_asked(place_);
+    end_if_asked(location_);
     const std::int64_t now_ns = monotonic_ns();
     timespec cpu{};
     clockid_t clock{};
@@ -253,7 +253,7 @@ class Child {
     constexpr std::int64_t kQuickNs = 2 * kNsPerSecond;
     if (now_ns - began_ns_ < kQuickNs) return;
     if (!bar_) bar_.emplace(true);
-    bar_->show(share(), "reading " + place_);
+    bar_->show(share(), "reading " + location_);
   }
 
   /// Fraction of the memory that was written to, 0..1; negative before there is some.
@@ -265,7 +265,7 @@ class Child {
   }
 
   const SandboxJob& job_;
-  std::string place_;
+  std::string location_;
   File channel_, memory_;
   pid_t pid_ = -1;
   std::optional<std::size_t> size_;

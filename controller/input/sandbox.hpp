@@ -50,7 +50,7 @@ class SandboxReader {
   SandboxReader(int channel, int memory) : channel_(channel), memory_(memory) {}
 
   /// Names the file that is read now, one of several. The message of a crash names it.
-  void at(const std::string& place) { say(SandboxWord::at, place); }
+  void at(const std::string& location) { say(SandboxWord::at, location); }
 
   /// Sends `header`, of less than kLongestSandboxWord bytes, and returns the memory that the parent
   /// accepted for it, all zeros. Once. Does not return if the parent refuses.
@@ -67,8 +67,8 @@ inline constexpr int kReadCpuSeconds = 60, kMostReadCpuSeconds = 86400;
 
 /// One foreign file that is to be read.
 struct SandboxJob {
-  std::string place;  ///< begins every complaint: the file
-  std::string kind;   ///< the expected kind, for complaints: NRRD
+  std::string location;  ///< begins every complaint: the file
+  std::string kind;      ///< the expected kind, for complaints: NRRD
   /// Largest file that a reader holds as a whole before it knows the content.
   std::uint64_t file_bytes = 0;
   int cpu_s = kReadCpuSeconds;

@@ -29,9 +29,9 @@ namespace {
 
 void check_side(const ToolSpec& spec, double side_vox, const char* side, const char* way_out) {
   if (side_vox <= kMaxToolSide) return;
-  refuse(spec.size_place, " makes a tool of " + text_beside(side_vox, kMaxToolSide) +
-                              " samples along " + side + ", above the limit of " +
-                              std::to_string(kMaxToolSide) + "; " + way_out);
+  refuse(spec.size_location, " makes a tool of " + text_beside(side_vox, kMaxToolSide) +
+                                 " samples along " + side + ", above the limit of " +
+                                 std::to_string(kMaxToolSide) + "; " + way_out);
 }
 
 /// The spindle turns about x = z = 0.
@@ -41,22 +41,23 @@ void check_axis(const ToolSpec& spec, const ToolMesh& mesh) {
         mesh.points_mm, {}, [i = axis](const ToolMesh::Point& p) { return p[i]; });
     const double low_mm = (*low)[axis], high_mm = (*high)[axis];
     if (low_mm < 0 && high_mm > 0) continue;
-    refuse(spec.size_place, std::string(" lies beside its axis, the file's y: ") + name +
-                                " goes from " + short_text(low_mm) + " to " + short_text(high_mm) +
-                                " mm; move the mesh so that the spindle's axis is at x = z = 0");
+    refuse(spec.size_location, std::string(" lies beside its axis, the file's y: ") + name +
+                                   " goes from " + short_text(low_mm) + " to " +
+                                   short_text(high_mm) +
+                                   " mm; move the mesh so that the spindle's axis is at x = z = 0");
   }
 }
 
 SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm) {
   if (!size.size_vox && size.radius_mm < voxel_mm / 2) {
-    refuse(spec.size_place, " is below half a voxel (" + short_text(voxel_mm / 2) +
-                                "); use a larger radius or a finer volume");
+    refuse(spec.size_location, " is below half a voxel (" + short_text(voxel_mm / 2) +
+                                   "); use a larger radius or a finer volume");
   }
   if (size.size_vox && *size.size_vox * size.pitch_mm < voxel_mm * (1 - 1e-9)) {
-    refuse(spec.size_place, " makes a tool of " +
-                                text_beside(*size.size_vox * size.pitch_mm, voxel_mm) +
-                                " mm, below a voxel (" + short_text(voxel_mm) +
-                                "); use a larger one or a larger pitch_mm");
+    refuse(spec.size_location, " makes a tool of " +
+                                   text_beside(*size.size_vox * size.pitch_mm, voxel_mm) +
+                                   " mm, below a voxel (" + short_text(voxel_mm) +
+                                   "); use a larger one or a larger pitch_mm");
   }
   const double across_mm = 2 * size.radius_mm;
   const bool long_tool = !size.size_vox && size.length_mm.value_or(default_length_mm(
@@ -86,13 +87,13 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
              "use a smaller scale (mm per unit of the file) or a coarser volume");
   SceneTool tool = make_mesh_tool(spec.name, std::move(mesh), pitch_mm);
   if (tool.radius_mm < voxel_mm / 2) {
-    refuse(spec.size_place, " reaches less than half a voxel (" + short_text(voxel_mm / 2) +
-                                " mm) from its axis; use a larger scale or a finer volume");
+    refuse(spec.size_location, " reaches less than half a voxel (" + short_text(voxel_mm / 2) +
+                                   " mm) from its axis; use a larger scale or a finer volume");
   }
   if (tool.offsets.empty()) {
-    refuse(spec.size_place, " is so thin that no sample lies in it, they are " +
-                                short_text(pitch_mm) +
-                                " mm apart; give a smaller pitch_mm or a larger scale");
+    refuse(spec.size_location, " is so thin that no sample lies in it, they are " +
+                                   short_text(pitch_mm) +
+                                   " mm apart; give a smaller pitch_mm or a larger scale");
   }
   return tool;
 }
@@ -101,13 +102,13 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
 void check_shaft(const ToolSpec& spec, const SceneTool& tool, double voxel_mm) {
   if (!spec.shaft.radius_mm) return;
   if (*spec.shaft.length_mm <= tool.length_mm * (1 + 1e-9)) {
-    refuse(spec.shaft_place, " ends no farther than the head, which is " +
-                                 short_text(tool.length_mm) +
-                                 " mm long; it counts from the tool's tip, so use more");
+    refuse(spec.shaft_location, " ends no farther than the head, which is " +
+                                    short_text(tool.length_mm) +
+                                    " mm long; it counts from the tool's tip, so use more");
   }
   if (*spec.shaft.radius_mm >= voxel_mm / 2) return;
-  refuse(spec.shaft_place, " is of a shaft thinner than a voxel (" + short_text(voxel_mm) +
-                               " mm); use a larger shaft_radius_mm or a finer volume");
+  refuse(spec.shaft_location, " is of a shaft thinner than a voxel (" + short_text(voxel_mm) +
+                                  " mm); use a larger shaft_radius_mm or a finer volume");
 }
 
 }  // namespace
@@ -136,8 +137,8 @@ SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched, const Mesh
     size.pitch_mm = thin && spec.shape != kMeshShape ? touched.voxel_mm / 2 : touched.voxel_mm;
   }
   if (size.pitch_mm > touched.voxel_mm * (1 + 1e-9)) {
-    refuse(spec.pitch_place, " is above the smallest voxel edge and leaves gaps; use at most " +
-                                 number_text(touched.voxel_mm));
+    refuse(spec.pitch_location, " is above the smallest voxel edge and leaves gaps; use at most " +
+                                    number_text(touched.voxel_mm));
   }
   SceneTool tool = spec.shape == kMeshShape ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, from)
                                             : load_shape(spec, size, touched.voxel_mm);
@@ -146,11 +147,11 @@ SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched, const Mesh
   tool.shaft = tool_shaft(spec.shaft, tool.length_mm);
   const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
   if (side_mm > touched.side_mm) {
-    refuse(spec.size_place, " makes a tool of " + text_beside(side_mm, touched.side_mm) + " mm" +
-                                (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
-                                ", larger than the volume (" + short_text(touched.side_mm) +
-                                " mm); use a smaller " +
-                                (spec.shape == kMeshShape ? "scale" : "tool"));
+    refuse(spec.size_location, " makes a tool of " + text_beside(side_mm, touched.side_mm) + " mm" +
+                                   (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
+                                   ", larger than the volume (" + short_text(touched.side_mm) +
+                                   " mm); use a smaller " +
+                                   (spec.shape == kMeshShape ? "scale" : "tool"));
   }
   return tool;
 }
@@ -275,7 +276,7 @@ void check_labelled_materials(const LoadedScene& scene) {
 }
 
 /// A material of the scene without a voxel shows and protects nothing: its name is a slip. Below
-/// the highest label it may hold the place of one that this file lacks, but not to be protected.
+/// the highest label it may stand for a label that this file lacks, unless it shall be protected.
 void check_material_names(const LoadedScene& scene) {
   std::vector<bool> there(scene.materials.size());
   for (const SceneVolume& volume : scene.volumes) {
@@ -385,7 +386,7 @@ Point3 arms_apart_mm(const SceneSpec& spec) {
   return apart_mm;
 }
 
-/// Gives the second arm its tool, the scale of the first, and its place: as written, or over the
+/// Gives the second arm its tool, the scale of the first, and its position: as written, or over the
 /// first one's; of a volume of the command line, which has its own size, as far from that as
 /// before.
 void finish_second_arm(const Point3& apart_mm, bool of_command_line, LoadedScene& scene) {

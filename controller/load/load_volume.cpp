@@ -176,13 +176,13 @@ void grow_labels(const VoxelGrid& grid, std::vector<Label>& labels) {
     for (std::int32_t y = 0; y < grid.ny; ++y) {
       for (std::int32_t x = 0; x < grid.nx; ++x, ++at) {
         Label& label = labels[static_cast<std::size_t>(at)];
-        const std::array<std::int32_t, 3> place{x, y, z};
+        const std::array<std::int32_t, 3> location{x, y, z};
         for (std::size_t axis = 0; axis < 3 && label == 0; ++axis) {
           const auto beside = [&](std::ptrdiff_t step) {
             return before[static_cast<std::size_t>(at + step)];
           };
-          if (place[axis] > 0) label = beside(-stride[axis]);
-          if (label == 0 && place[axis] + 1 < extent[axis]) label = beside(stride[axis]);
+          if (location[axis] > 0) label = beside(-stride[axis]);
+          if (label == 0 && location[axis] + 1 < extent[axis]) label = beside(stride[axis]);
         }
       }
     }

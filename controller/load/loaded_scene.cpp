@@ -182,7 +182,7 @@ LoadedScene second_arm_of(const LoadedScene& scene) {
   second.device = arm.device;
   second.limits = arm.limits;
   second.hand_script = arm.hand_script;
-  second.hand_place = arm.hand_place;
+  second.hand_location = arm.hand_location;
   second.second.reset();
   second.tools = scene.tools;
   second.active_tool = scene.second_tool;

@@ -135,7 +135,7 @@ struct DeviceSettings {
   std::optional<std::array<double, 3>> encoder_sign;  ///< 1 or -1 each; if empty, 1
   /// In the hand at the start; if empty, the first tool, and of a second device the second.
   std::string first_tool;
-  std::string tool_place;  ///< begins a complaint about it
+  std::string tool_location;  ///< begins a complaint about it
 };
 
 /// [force]
@@ -191,7 +191,7 @@ struct SecondArm {
   DeviceSettings device;
   bool offset_given = false;  ///< else it has the first one's
   LimitSettings limits;       ///< the scene's, and its device's where the scene has none
-  std::string hand_script, hand_place;
+  std::string hand_script, hand_location;
 };
 
 /// All settings of a scene but volumes and tools; the same before and after loading.
@@ -206,8 +206,8 @@ struct SceneSettings {
   LimitSettings limits;
   ServoSettings servo;
   std::optional<SecondArm> second;
-  std::string hand_script;  ///< [hand] script, relative to the working directory; may be empty
-  std::string hand_place;   ///< begins a complaint about it
+  std::string hand_script;    ///< [hand] script, relative to the working directory; may be empty
+  std::string hand_location;  ///< begins a complaint about it
 };
 
 /// One [[volume]] as written; `where` begins a complaint about its content.
@@ -229,10 +229,10 @@ struct VolumeSpec {
       orientation;  ///< world from source; if empty, the z axis is up
 };
 
-/// One [[tool]] as written; the `..._place` members begin complaints about size and pitch.
+/// One [[tool]] as written; the `..._location` members begin complaints about size and pitch.
 struct ToolSpec {
   std::string where;  ///< `file:line`, of a mesh
-  std::string size_place, pitch_place;
+  std::string size_location, pitch_location;
   std::string name;
   std::string bur;  ///< as written; its expansion is in the other members
   std::string shape;
@@ -241,7 +241,7 @@ struct ToolSpec {
   bool pitch_given = false;  ///< else the smallest voxel of the solid volumes
   ToolSize size;
   ShaftSize shaft;
-  std::string shaft_place;  ///< begins complaints about the shaft
+  std::string shaft_location;  ///< begins complaints about the shaft
   bool turns = true;
 };
 

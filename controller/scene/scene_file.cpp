@@ -103,9 +103,9 @@ bool replaces_coupling(const KeyOverride& setting) {
 
 KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
   const std::size_t equals = text.find('=');
-  const std::string place = "--set " + one_line(text);
+  const std::string location = "--set " + one_line(text);
   if (equals == text.npos || equals == 0 || equals + 1 == text.size() || one_line(text) != text) {
-    refuse(place, ": not KEY=VALUE; write such as force.stiffness_n_per_mm=0.3");
+    refuse(location, ": not KEY=VALUE; write such as force.stiffness_n_per_mm=0.3");
   }
   const std::string_view key = text.substr(0, equals);
   if (std::ranges::find(keys, key, &SceneKey::name) == keys.end() && !is_law_setting(key, keys)) {
@@ -179,7 +179,7 @@ void make_unit(const SceneTable& table, std::array<double, 4>& q) {
   constexpr double kTolerance = 0.01;  // rounded by hand, not forgotten
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (std::abs(length - 1) > kTolerance) {
-    refuse(table.place("pose.orientation"),
+    refuse(table.location("pose.orientation"),
            " has length " + text_beside(length, 1) + "; write a unit quaternion [x, y, z, w]");
   }
   for (double& component : q) component /= length;
@@ -189,20 +189,20 @@ void make_unit(const SceneTable& table, std::array<double, 4>& q) {
 void check_size(const SceneTable& table, const ToolSpec& tool) {
   const ToolSize& size = tool.size;
   if (!table.has("radius_mm") && !table.has("size_vox")) {
-    refuse(table.place(), " needs either radius_mm or size_vox; write one of them");
+    refuse(table.location(), " needs either radius_mm or size_vox; write one of them");
   }
   if (table.has("radius_mm") && table.has("size_vox")) {
-    refuse(table.place("radius_mm"), " contradicts size_vox; leave one of the two out");
+    refuse(table.location("radius_mm"), " contradicts size_vox; leave one of the two out");
   }
   if (!size.length_mm) return;
   if (size.size_vox) {
-    refuse(table.place("length_mm"), " contradicts size_vox, which is a cube; leave it out");
+    refuse(table.location("length_mm"), " contradicts size_vox, which is a cube; leave it out");
   }
   if (tool.shape == "ball") {
-    refuse(table.place("length_mm"), " contradicts the ball, which is round; leave it out");
+    refuse(table.location("length_mm"), " contradicts the ball, which is round; leave it out");
   }
   if (tool.shape == "wheel" && *size.length_mm > 2 * size.radius_mm) {
-    refuse(table.place("length_mm"),
+    refuse(table.location("length_mm"),
            " is more than the wheel's diameter; use at most " + number_text(2 * size.radius_mm));
   }
 }
@@ -211,31 +211,31 @@ void check_size(const SceneTable& table, const ToolSpec& tool) {
 void check_shaft(const SceneTable& table, ToolSpec& tool) {
   const ShaftSize& shaft = tool.shaft;
   if (shaft.radius_mm && !shaft.length_mm) {
-    refuse(table.place("shaft_radius_mm"),
+    refuse(table.location("shaft_radius_mm"),
            " has no length; write shaft_length_mm, from the tool's tip to the shaft's end");
   }
   if (shaft.length_mm && !shaft.radius_mm) {
-    refuse(table.place("shaft_length_mm"), " has no radius; write shaft_radius_mm");
+    refuse(table.location("shaft_length_mm"), " has no radius; write shaft_radius_mm");
   }
   if (shaft.handpiece_radius_mm && !shaft.radius_mm) {
-    refuse(table.place("handpiece_radius_mm"),
+    refuse(table.location("handpiece_radius_mm"),
            " has no shaft to hold; write shaft_radius_mm and shaft_length_mm");
   }
   if (shaft.handpiece_length_mm && !shaft.handpiece_radius_mm) {
-    refuse(table.place("handpiece_length_mm"), " has no radius; write handpiece_radius_mm");
+    refuse(table.location("handpiece_length_mm"), " has no radius; write handpiece_radius_mm");
   }
   if (shaft.handpiece_radius_mm && *shaft.handpiece_radius_mm < *shaft.radius_mm) {
-    refuse(table.place("handpiece_radius_mm"),
+    refuse(table.location("handpiece_radius_mm"),
            " is narrower than the shaft; use at least " + number_text(*shaft.radius_mm));
   }
-  if (shaft.length_mm) tool.shaft_place = table.place("shaft_length_mm");
+  if (shaft.length_mm) tool.shaft_location = table.location("shaft_length_mm");
 }
 
 void finish_volume(const SceneTable& table, VolumeSpec& volume) {
   volume.where = table.where("file");
   if (!table.has("name")) volume.name = stem_of(volume.file);
   if (volume.window && (*volume.window)[0] >= (*volume.window)[1]) {
-    refuse(table.place("window"), " is empty; write [low, high] with low < high");
+    refuse(table.location("window"), " is empty; write [low, high] with low < high");
   }
   if (volume.orientation) make_unit(table, *volume.orientation);
 }
@@ -244,19 +244,19 @@ void finish_tool(const SceneTable& table, ToolSpec& tool) {
   std::string name;
   if (tool.shape == kMeshShape) {
     tool.where = table.where("file");
-    tool.size_place = table.place("file");
+    tool.size_location = table.location("file");
     name = stem_of(tool.file);
   } else {
     check_size(table, tool);
     const bool in_voxels = tool.size.size_vox.has_value();
-    tool.size_place = table.place(in_voxels ? "size_vox" : "radius_mm");
+    tool.size_location = table.location(in_voxels ? "size_vox" : "radius_mm");
     name = tool.shape + " " +
            (in_voxels ? std::to_string(*tool.size.size_vox) + " vox"
                       : number_text(tool.size.radius_mm) + " mm");
   }
   check_shaft(table, tool);
   tool.pitch_given = table.has("pitch_mm");
-  if (tool.pitch_given) tool.pitch_place = table.place("pitch_mm");
+  if (tool.pitch_given) tool.pitch_location = table.location("pitch_mm");
   if (!table.has("name")) tool.name = name;
 }
 
@@ -264,7 +264,7 @@ void finish_tool(const SceneTable& table, ToolSpec& tool) {
 Material& material_named(const SceneTable& table, const std::string& name,
                          std::vector<Material>& materials) {
   if (name == materials.front().name) {
-    refuse(table.place("name"), " is air and has no properties; use another name");
+    refuse(table.location("name"), " is air and has no properties; use another name");
   }
   const auto material = std::ranges::find(materials, name, &Material::name);
   return material != materials.end() ? *material : materials.emplace_back(known_material(name));
@@ -273,17 +273,17 @@ Material& material_named(const SceneTable& table, const std::string& name,
 void finish_device(const SceneTable& table, SceneSpec& scene) {
   // Without contact there is no surface to go to.
   scene.offset_given = table.has("offset_mm") || scene.force.model == ForceModel::external;
-  if (table.has("first_tool")) scene.device.tool_place = table.place("first_tool");
+  if (table.has("first_tool")) scene.device.tool_location = table.location("first_tool");
   for (const double sign : scene.device.encoder_sign.value_or(std::array{1.0, 1.0, 1.0})) {
     if (std::abs(sign) == 1) continue;
     refuse(
-        table.place("encoder_sign"),
+        table.location("encoder_sign"),
         " is not 1 or -1 at each joint; ./kerf controller --probe shows which (docs/devices.md)");
   }
   if (!scene.device.torque_scale) return;
   for (const double scale : *scene.device.torque_scale) {
     if (std::abs(scale) >= kMinTorqueScale) continue;
-    refuse(table.place("torque_scale"),
+    refuse(table.location("torque_scale"),
            " is below 0.001 N mm per count; leave the key out to keep the motors off");
   }
 }
@@ -297,7 +297,7 @@ void choose_cut(const SceneTable& table, SceneSpec& scene) {
   }
   if (scene.force.model != ForceModel::external) return;
   if (table.has("model") && scene.cut.model != CutModel::none) {
-    refuse(table.place("model"),
+    refuse(table.location("model"),
            " cuts by contact, and force.model = \"external\" has none; leave it out");
   }
   scene.cut.model = CutModel::none;
@@ -319,7 +319,7 @@ void refuse_unfelt(const SceneSpec& scene) {
   if (scene.force.model == ForceModel::proxy) return;
   for (const ToolSpec& tool : scene.tools) {
     if (!tool.shaft.length_mm) continue;
-    refuse(tool.shaft_place,
+    refuse(tool.shaft_location,
            " is felt by a proxy alone; set force.model = \"proxy\", or leave the shaft out");
   }
 }
@@ -329,14 +329,15 @@ void refuse_idle_coupling(const SceneTable& table, const ForceSettings& force) {
   if (force.law.name.empty()) return;
   for (const std::string_view key : kCouplingKeys) {
     if (table.has(key)) {
-      refuse(table.place(key), " is of the coupling, and force.law is in its place; leave it out");
+      refuse(table.location(key),
+             " is of the coupling, and force.law is in its place; leave it out");
     }
   }
 }
 
 LimitPlaces limit_places(const SceneTable& table) {
-  const auto place = [&](const char* key) { return table.has(key) ? table.place(key) : ""; };
-  return {place("force_n"), place("continuous_force_n"), place("slew_n_per_ms")};
+  const auto location = [&](const char* key) { return table.has(key) ? table.location(key) : ""; };
+  return {location("force_n"), location("continuous_force_n"), location("slew_n_per_ms")};
 }
 
 /// A scene file after parsing, and its tables beside the rows of their keys.
@@ -368,7 +369,7 @@ template <class Spec>
 void add_named(const SceneTable& table, Spec spec, std::vector<Spec>& list,
                const char* way_out = "write another name = \"..\"") {
   if (std::ranges::find(list, spec.name, &Spec::name) != list.end()) {
-    refuse(table.place(), " is the second named \"" + spec.name + "\"; " + way_out);
+    refuse(table.location(), " is the second named \"" + spec.name + "\"; " + way_out);
   }
   list.push_back(std::move(spec));
 }
@@ -424,7 +425,7 @@ void fill_in(SceneSpec& scene) {
   }
   if (scene.tools.empty()) {
     ToolSpec& tool = scene.tools.emplace_back();
-    tool.size_place = scene.path + ": tool";
+    tool.size_location = scene.path + ": tool";
     tool.name = "tip";
     tool.shape = "ball";
     tool.size.radius_mm = 2;
@@ -503,10 +504,10 @@ std::vector<KeyOverride> settings_of_arm(std::span<const KeyOverride> settings) 
 
 /// The script of the tables' hand, from the scene's folder.
 void finish_hand(const SceneTables& tables, const std::filesystem::path& path, std::string& script,
-                 std::string& place) {
+                 std::string& location) {
   if (script.empty()) return;
   script = (path.parent_path() / script).string();
-  place = tables.once("hand").place("script");
+  location = tables.once("hand").location("script");
 }
 
 SecondArm read_second_arm(const TomlNode& root, const std::filesystem::path& path, SceneKeys keys) {
@@ -518,17 +519,17 @@ SecondArm read_second_arm(const TomlNode& root, const std::filesystem::path& pat
   const SceneTable device = tables.once("device");
   for (const char* key : kSharedKeys) {
     if (!device.has(key)) continue;
-    refuse(device.place(key),
+    refuse(device.location(key),
            " is the scene's, and both hands have it; write it in the first "
            "[[device]] alone");
   }
   finish_device(device, parts.scene);
-  finish_hand(tables, path, parts.scene.hand_script, parts.scene.hand_place);
+  finish_hand(tables, path, parts.scene.hand_script, parts.scene.hand_location);
   return {.device = parts.scene.device,
           .offset_given = parts.scene.offset_given,
           .limits = {},
           .hand_script = parts.scene.hand_script,
-          .hand_place = parts.scene.hand_place};
+          .hand_location = parts.scene.hand_location};
 }
 
 /// A motor's scale of one device is none of another's.
@@ -546,7 +547,7 @@ void check_tool_name(const DeviceSettings& device, const SceneSpec& scene) {
   for (const ToolSpec& tool : scene.tools) names.push_back(tool.name);
   if (device.first_tool.empty() || std::ranges::find(names, device.first_tool) != names.end())
     return;
-  refuse(device.tool_place, unknown_word(device.first_tool, names, "\""));
+  refuse(device.tool_location, unknown_word(device.first_tool, names, "\""));
 }
 
 SceneSpec read_scene(const TomlNode& root, const TomlNode* second,
@@ -579,7 +580,7 @@ SceneSpec read_scene(const TomlNode& root, const TomlNode* second,
   settle_device(scene);
   refuse_uncut(scene);
   refuse_unfelt(scene);
-  finish_hand(tables, path, scene.hand_script, scene.hand_place);
+  finish_hand(tables, path, scene.hand_script, scene.hand_location);
   return std::move(parts.scene);
 }
 
@@ -595,13 +596,13 @@ void settle_arm(const SceneSpec& scene, const DeviceSettings& held, LimitSetting
                            ", true newtons per commanded newton; use 0.1 to 10, 1 to begin with");
   }
   const ForceFigures device = force_figures(held.personality);
-  const auto settle = [&](const std::string& place, double low, double high, double own,
+  const auto settle = [&](const std::string& location, double low, double high, double own,
                           double& value) {
-    if (place.empty()) {
+    if (location.empty()) {
       value = own;
     } else if (value < low || value > high) {
-      refuse(place, " is out of range for " + std::string(word_of(held.personality)) + "; use " +
-                        number_text(low) + " to " + number_text(high));
+      refuse(location, " is out of range for " + std::string(word_of(held.personality)) + "; use " +
+                           number_text(low) + " to " + number_text(high));
     }
   };
   constexpr double kLeastN = 0.01;
@@ -678,9 +679,9 @@ void check_hand_script(const SceneSettings& scene) {
     return;
   }
   if (const std::string why = access_error(scene.hand_script); !why.empty()) {
-    refuse(scene.hand_place, why);
+    refuse(scene.hand_location, why);
   }
-  refuse(scene.hand_place,
+  refuse(scene.hand_location,
          " is no file in the scene's folder; copy the script there, or name one by its whole path");
 }
 

@@ -77,17 +77,17 @@ void spell_out(TomlNode& tool, const TomlNode& bur, const std::string& file) {
   const std::string* text = std::get_if<std::string>(&bur.value);
   if (text == nullptr || !is_usable_text(*text)) return;  // which the row of the key refuses
   const std::string where = bur.line == 0 ? ": --set" : ":" + std::to_string(bur.line) + ":";
-  const std::string place = file + where + " tool.bur = " + bur.shown;
+  const std::string location = file + where + " tool.bur = " + bur.shown;
   const std::optional<Bur> known = parse_bur(*text);
   if (!known) {
-    refuse(place,
+    refuse(location,
            " is no bur; write its head and its diameter in tenths of a mm, such as "
            "\"001 014\"; known are " +
                known_heads());
   }
   for (const char* key : {"shape", "file", "size_vox", "radius_mm"}) {
     if (tool.find(key) != nullptr)
-      refuse(place, std::string(" contradicts ") + key + "; leave one of the two out");
+      refuse(location, std::string(" contradicts ") + key + "; leave one of the two out");
   }
   const auto give = [&tool, line = bur.line](const char* key, TomlValue value) {
     if (tool.find(key) != nullptr) return;

@@ -21,17 +21,17 @@ namespace {
 struct Take {
   const SceneKey& key;
   const TomlNode& node;
-  const std::string place;  ///< `file:line: table.key = value`
+  const std::string location;  ///< `file:line: table.key = value`
   const std::string& file;
 
   void operator()(bool* into) const {
     const bool* flag = std::get_if<bool>(&node.value);
-    if (flag == nullptr) refuse(place, " is not a switch; write true or false");
+    if (flag == nullptr) refuse(location, " is not a switch; write true or false");
     *into = *flag;
   }
   void operator()(int* into) const {
     const bool whole = std::holds_alternative<std::int64_t>(node.value);
-    if (!whole) refuse(place, " is not a whole number; write one without point or exponent");
+    if (!whole) refuse(location, " is not a whole number; write one without point or exponent");
     *into = static_cast<int>(number(node));
   }
   void operator()(double* into) const {
@@ -59,7 +59,7 @@ struct Take {
     const TomlNode* name = is_table ? node.find("name") : &node;
     const std::string* text = name == nullptr ? nullptr : std::get_if<std::string>(&name->value);
     if (text == nullptr) {
-      refuse(place, " does not say which; write { name = \"..\" } and what it sets");
+      refuse(location, " does not say which; write { name = \"..\" } and what it sets");
     }
     const auto place_below = [&](const TomlNode& entry) {
       return place_of(entry, std::string(key.name) + "." + one_line(entry.key), file);
@@ -68,7 +68,7 @@ struct Take {
     try {
       row = is_table ? &find_law(into->kind, *text) : law_by_word(into->kind, *text);
     } catch (const LawError& error) {
-      refuse(is_table ? place_below(*name) : place, error.what());
+      refuse(is_table ? place_below(*name) : location, error.what());
     }
     if (row == nullptr) {
       *into = {into->kind, "", {}};
@@ -91,10 +91,10 @@ struct Take {
     const bool list = node.form == TomlNode::Form::array && node.entries.size() == N &&
                       std::ranges::all_of(node.entries, is_number);
     if (!one && !list) {
-      refuse(place, " is not a list of " + std::to_string(N) + " numbers; write " +
-                        (N == 2   ? "[a, b]"
-                         : N == 3 ? "[x, y, z]"
-                                  : "[x, y, z, w]"));
+      refuse(location, " is not a list of " + std::to_string(N) + " numbers; write " +
+                           (N == 2   ? "[a, b]"
+                            : N == 3 ? "[x, y, z]"
+                                     : "[x, y, z, w]"));
     }
     for (std::size_t i = 0; i < N; ++i) (*into)[i] = number(one ? node : node.entries[i]);
   }
@@ -102,7 +102,7 @@ struct Take {
     std::array<double, 3> sides{};
     (*this)(&sides);
     if (std::ranges::any_of(sides, [](double side) { return side != std::floor(side); })) {
-      refuse(place, " counts " + std::string(key.unit) + "; write whole numbers");
+      refuse(location, " counts " + std::string(key.unit) + "; write whole numbers");
     }
     const auto side = [&](std::size_t axis) { return static_cast<std::int32_t>(sides[axis]); };
     *into = {side(0), side(1), side(2)};
@@ -116,16 +116,16 @@ struct Take {
   /// One of the words of the key, if it has any.
   [[nodiscard]] std::string text() const {
     const std::string* text = std::get_if<std::string>(&node.value);
-    if (text == nullptr) refuse(place, " is not text; put it in quotes");
+    if (text == nullptr) refuse(location, " is not text; put it in quotes");
     if (!is_usable_text(*text)) {
-      refuse(place, " is not a usable text; write 1 to " + std::to_string(kLongestText) +
-                        " printable characters");
+      refuse(location, " is not a usable text; write 1 to " + std::to_string(kLongestText) +
+                           " printable characters");
     }
     const auto words = key.allowed.words;
     if (words.empty() || std::ranges::find(words, *text) != words.end()) return *text;
     const auto [lo, hi] = key.allowed.range;
     const bool or_number = lo < hi;
-    refuse(place,
+    refuse(location,
            unknown_word(*text, words, "\"") + (or_number ? ", or " + range_text(lo, hi) : ""));
   }
   /// Whether the value is a word in place of a number.
@@ -136,13 +136,13 @@ struct Take {
   /// The number of `entry`: the value, or a part of it.
   [[nodiscard]] double number(const TomlNode& entry) const {
     const std::optional<double> number = entry.number();
-    if (!number) refuse(place, " is not a number; write one without quotes or unit");
+    if (!number) refuse(location, " is not a number; write one without quotes or unit");
     const auto [lo, hi] = key.allowed.range;
     if (*number >= lo && *number <= hi) return *number + 0.0;  // no nan is; -0 becomes 0
     std::string words;
     for (const std::string_view word : key.allowed.words)
       words += ", or \"" + std::string(word) + '"';
-    refuse(place, " is out of range; use " + range_text(lo, hi) + words);
+    refuse(location, " is out of range; use " + range_text(lo, hi) + words);
   }
 };
 
@@ -171,7 +171,7 @@ void SceneTable::read_conditional(SceneParts& parts) const {
     if (is_used(key, parts)) {
       read(key, parts);
     } else if (const std::string_view name = name_in_table(key); has(name)) {
-      refuse(place(name), refusal_of(key.only_with));
+      refuse(location(name), refusal_of(key.only_with));
     }
   }
 }
@@ -180,9 +180,9 @@ void SceneTable::read(const SceneKey& key, SceneParts& parts) const {
   const std::string_view name = name_in_table(key);
   const std::string form(key.options.required_as);
   if (has(name)) {
-    std::visit(Take{key, *node_->find(name), place(name), file_}, key.at(parts));
+    std::visit(Take{key, *node_->find(name), location(name), file_}, key.at(parts));
   } else if (!form.empty()) {
-    refuse(place(), " has no " + std::string(name) + "; write " + form);
+    refuse(location(), " has no " + std::string(name) + "; write " + form);
   }
 }
 
@@ -195,11 +195,11 @@ std::string SceneTable::where(std::string_view key) const {
   return file_ + (line == 0 ? ": --set" : ":" + std::to_string(line));
 }
 
-std::string SceneTable::place(std::string_view key) const {
+std::string SceneTable::location(std::string_view key) const {
   return place_of(*node_->find(key), name_ + "." + std::string(key), file_);
 }
 
-std::string SceneTable::place() const {
+std::string SceneTable::location() const {
   return file_ + ":" + std::to_string(node_->line) + ": " + name_;
 }
 

@@ -30,9 +30,9 @@ class SceneTable {
   /// `file:line` of the key.
   [[nodiscard]] std::string where(std::string_view key) const;
   /// `file:line: table.key = value`, the beginning of every complaint about a value.
-  [[nodiscard]] std::string place(std::string_view key) const;
+  [[nodiscard]] std::string location(std::string_view key) const;
   /// `file:line: table`, for what is missing.
-  [[nodiscard]] std::string place() const;
+  [[nodiscard]] std::string location() const;
 
  private:
   void read(const SceneKey& key, SceneParts& parts) const;

@@ -37,15 +37,15 @@ std::string text_of(const ToolMesh::Point& p) {
 }
 
 void check_coordinates(std::span<const LooseTriangle> triangles, double scale,
-                       const std::string& place) {
+                       const std::string& location) {
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (const auto& corner : triangles[t]) {
       for (const float x : corner) {
         const double mm = scale * static_cast<double>(x);
         if (std::abs(mm) <= kLargestMeshMm) continue;  // not so for NaN
-        refuse(place, ": triangle " + std::to_string(t + 1) + " has the coordinate " +
-                          short_text(mm) + " mm; use numbers within " + short_text(kLargestMeshMm) +
-                          " mm, check scale");
+        refuse(location, ": triangle " + std::to_string(t + 1) + " has the coordinate " +
+                             short_text(mm) + " mm; use numbers within " +
+                             short_text(kLargestMeshMm) + " mm, check scale");
       }
     }
   }
@@ -147,7 +147,7 @@ std::array<double, 2> noises(std::span<const LooseTriangle> triangles) {
 
 /// The mesh with its corners joined: as they are, else without the noise of their numbers.
 ToolMesh closed_mesh(std::span<const LooseTriangle> triangles, double scale,
-                     const std::string& place) {
+                     const std::string& location) {
   ToolMesh mesh = joined(triangles, scale, 0);
   const std::string fault = fault_of(mesh);
   if (fault.empty()) return mesh;
@@ -156,7 +156,7 @@ ToolMesh closed_mesh(std::span<const LooseTriangle> triangles, double scale,
     mesh = joined(triangles, scale, noise);
     if (fault_of(mesh).empty()) return mesh;
   }
-  refuse(place, fault);
+  refuse(location, fault);
 }
 
 /// Puts the middle of the height at 0, in whole nanometres.
@@ -171,42 +171,42 @@ void stand_in_the_middle(std::vector<ToolMesh::Point>& points_mm) {
   }
 }
 
-void check_size(std::size_t triangles, const std::string& place) {
-  if (triangles == 0) refuse(place, ": no triangles; export a closed mesh");
+void check_size(std::size_t triangles, const std::string& location) {
+  if (triangles == 0) refuse(location, ": no triangles; export a closed mesh");
   if (triangles <= kMaxMeshTriangles) return;
-  refuse(place, ": " + std::to_string(triangles) + " triangles, above the limit of " +
-                    std::to_string(kMaxMeshTriangles) + "; simplify the mesh");
+  refuse(location, ": " + std::to_string(triangles) + " triangles, above the limit of " +
+                       std::to_string(kMaxMeshTriangles) + "; simplify the mesh");
 }
 
-void check_encloses(double volume_mm3, const std::string& place) {
+void check_encloses(double volume_mm3, const std::string& location) {
   if (volume_mm3 >= 1e-9) return;
-  refuse(place, ": the mesh encloses " + short_text(volume_mm3) +
-                    " mm^3; export a solid, check scale (mm per unit of the file)");
+  refuse(location, ": the mesh encloses " + short_text(volume_mm3) +
+                       " mm^3; export a solid, check scale (mm per unit of the file)");
 }
 
 }  // namespace
 
-void check_mesh(const ToolMesh& mesh, const std::string& place) {
-  check_size(mesh.triangles.size(), place);
+void check_mesh(const ToolMesh& mesh, const std::string& location) {
+  check_size(mesh.triangles.size(), location);
   for (const ToolMesh::Point& point : mesh.points_mm) {
     for (const double mm : point) {
       if (std::abs(mm) <= 2 * kLargestMeshMm) continue;  // moved to the middle
-      refuse(place, ": has the coordinate " + short_text(mm) + " mm; record it again");
+      refuse(location, ": has the coordinate " + short_text(mm) + " mm; record it again");
     }
   }
-  if (const std::string fault = fault_of(mesh); !fault.empty()) refuse(place, fault);
+  if (const std::string fault = fault_of(mesh); !fault.empty()) refuse(location, fault);
   ToolMesh turned = mesh;
-  check_encloses(turn_outward(turned), place);
-  if (turned.triangles != mesh.triangles) refuse(place, ": inside out; record it again");
+  check_encloses(turn_outward(turned), location);
+  if (turned.triangles != mesh.triangles) refuse(location, ": inside out; record it again");
 }
 
 ToolMesh join_triangles(std::span<const LooseTriangle> triangles, double scale,
-                        const std::string& place) {
-  check_size(triangles.size(), place);
-  check_coordinates(triangles, scale, place);
-  ToolMesh mesh = closed_mesh(triangles, scale, place);
+                        const std::string& location) {
+  check_size(triangles.size(), location);
+  check_coordinates(triangles, scale, location);
+  ToolMesh mesh = closed_mesh(triangles, scale, location);
   stand_in_the_middle(mesh.points_mm);
-  check_encloses(turn_outward(mesh), place);
+  check_encloses(turn_outward(mesh), location);
   return mesh;
 }
 
@@ -221,9 +221,9 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at) {
   return word;
 }
 
-void check_count(std::uint64_t triangles, const std::string& place) {
+void check_count(std::uint64_t triangles, const std::string& location) {
   if (triangles <= kMaxMeshTriangles) return;
-  refuse(place,
+  refuse(location,
          ": more than " + std::to_string(kMaxMeshTriangles) + " triangles; simplify the mesh");
 }
 
@@ -252,7 +252,7 @@ bool is_word(std::string_view word, std::string_view lower) {
 /// The words of an STL text, with the line for complaints.
 class StlText {
  public:
-  StlText(std::string_view text, const std::string& place) : rest_(text), place_(place) {}
+  StlText(std::string_view text, const std::string& location) : rest_(text), location_(location) {}
 
   /// Empty at the end.
   std::string_view next() {
@@ -294,7 +294,7 @@ class StlText {
     constexpr std::size_t kLongest = 40;
     const std::string found =
         word.empty() ? "the file ends" : "\"" + std::string(word.substr(0, kLongest)) + "\"";
-    refuse(place_ + ":" + std::to_string(line_),
+    refuse(location_ + ":" + std::to_string(line_),
            ": " + found + " where " + std::string(wanted) + " belongs; export the mesh again");
   }
 
@@ -308,7 +308,7 @@ class StlText {
   }
 
   std::string_view rest_;
-  const std::string& place_;
+  const std::string& location_;
   std::ptrdiff_t line_ = 1;
 };
 
@@ -334,13 +334,13 @@ LooseTriangle read_facet(StlText& text) {
   return triangle;
 }
 
-std::vector<LooseTriangle> text_triangles(StlText text, const std::string& place) {
+std::vector<LooseTriangle> text_triangles(StlText text, const std::string& location) {
   std::vector<LooseTriangle> triangles;
   bool in_solid = false;
   for (std::string_view word = text.next(); !word.empty(); word = text.next()) {
     if (in_solid && is_word(word, "facet")) {
       triangles.push_back(read_facet(text));
-      check_count(triangles.size(), place);
+      check_count(triangles.size(), location);
     } else if (is_word(word, "solid")) {
       in_solid = true;
       text.skip_line();  // its name
@@ -356,24 +356,24 @@ std::vector<LooseTriangle> text_triangles(StlText text, const std::string& place
 
 }  // namespace
 
-std::vector<LooseTriangle> parse_stl(std::string_view bytes, const std::string& place) {
+std::vector<LooseTriangle> parse_stl(std::string_view bytes, const std::string& location) {
   if (bytes.size() >= kHeaderBytes) {
     const std::size_t count = word_at(bytes, kHeaderBytes - 4);
     if (bytes.size() == kHeaderBytes + kTriangleBytes * count) {
-      check_count(count, place);
+      check_count(count, location);
       return binary_triangles(bytes, count);
     }
     // Text holds no zero byte; a binary file does, at least in its count.
     if (bytes.find('\0') != bytes.npos) {
-      refuse(place, ": a binary STL of " + std::to_string(count) + " triangles has " +
-                        std::to_string(kHeaderBytes + kTriangleBytes * count) +
-                        " bytes, and the file has " + std::to_string(bytes.size()) +
-                        "; export the mesh again");
+      refuse(location, ": a binary STL of " + std::to_string(count) + " triangles has " +
+                           std::to_string(kHeaderBytes + kTriangleBytes * count) +
+                           " bytes, and the file has " + std::to_string(bytes.size()) +
+                           "; export the mesh again");
     }
   }
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
-  return text_triangles(StlText(bytes, place), place);
+  return text_triangles(StlText(bytes, location), location);
 }
 
 namespace {

@@ -35,21 +35,21 @@ struct ToolMesh {
 };
 
 /// Throws LoadError unless `join_triangles` could have made the mesh; each triangle has points.
-void check_mesh(const ToolMesh& mesh, const std::string& place);
+void check_mesh(const ToolMesh& mesh, const std::string& location);
 
 /// A triangle whose corners are not yet joined with those of others.
 using LooseTriangle = std::array<std::array<float, 3>, 3>;
 
 /// Joins triangles at corners of equal coordinates; if that closes no mesh, at corners that the
 /// rounding of their numbers sets apart: four steps of a float, then one unit of the sixth digit,
-/// of the largest coordinate. `scale` is mm per unit of theirs; `place` begins each message.
+/// of the largest coordinate. `scale` is mm per unit of theirs; `location` begins each message.
 /// Triangles with two equal corners are left out. An inside-out mesh is turned outward, and so is
 /// each part of it, joined by edges, that is no hollow in another.
 ///
 /// Throws LoadError for coordinates beyond kLargestMeshMm, for an edge without a partner, for
 /// neighbours of opposite orientation, and if no volume is enclosed. Load time.
 [[nodiscard]] ToolMesh join_triangles(std::span<const LooseTriangle> triangles, double scale,
-                                      const std::string& place);
+                                      const std::string& location);
 
 /// Largest STL file: as text a triangle takes some 300 bytes.
 inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTriangles;
@@ -63,10 +63,10 @@ inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTri
 /// whose size is that of its binary count is binary, with any first word; any other without a zero
 /// byte is text.
 ///
-/// `place` begins a complaint. Throws LoadError with the line or the number of bytes for any other
-/// file, or one above kMaxMeshTriangles. Any thread; load time.
+/// `location` begins a complaint. Throws LoadError with the line or the number of bytes for any
+/// other file, or one above kMaxMeshTriangles. Any thread; load time.
 [[nodiscard]] std::vector<LooseTriangle> parse_stl(std::string_view bytes,
-                                                   const std::string& place);
+                                                   const std::string& location);
 
 /// The same of a file of at most kMaxStlBytes, in a sandbox.
 [[nodiscard]] std::vector<LooseTriangle> read_stl(const std::string& file,

@@ -348,7 +348,7 @@ std::vector<ProposalLine> proposal_lines(const VolumeProposal& p) {
   return {{"surface", surface.str()}, {"window", window.str()}, {"body", body.str()}, materials};
 }
 
-bool take_label_map(const SourceVolume& source, VolumeImage& image, const std::string& place) {
+bool take_label_map(const SourceVolume& source, VolumeImage& image, const std::string& location) {
   constexpr std::size_t kMostLabels = 256;
   if (source.min != 0 || !(source.max < kMostLabels)) return false;
   std::bitset<kMostLabels> seen;
@@ -360,7 +360,7 @@ bool take_label_map(const SourceVolume& source, VolumeImage& image, const std::s
   if (seen.count() < 3 || !is_label_map(image.grid, image.density)) return false;
   if (source.max >= kMaxMaterials) {
     const std::string last = std::to_string(std::lround(source.max));
-    throw LoadError(place + "label " + last + " is above " + std::to_string(kMaxMaterials - 1) +
+    throw LoadError(location + "label " + last + " is above " + std::to_string(kMaxMaterials - 1) +
                     ", the last that a scene has a material for; number the labels anew, or take "
                     "them as a scan with --window 0," +
                     last);

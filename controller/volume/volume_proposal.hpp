@@ -107,9 +107,9 @@ struct ProposalLine {
 /// If a file holds only labels, turns `image`, its densities, into a solid of them, each label at
 /// full density, and returns true. Labels are whole numbers up to 255 of which 0 and at least two
 /// others occur, in blocks with nothing between them, as no scan has them. Throws LoadError, which
-/// begins with `place`, if a label is higher than the number of materials of a scene. Load time.
+/// begins with `location`, if a label is higher than the number of materials of a scene. Load time.
 [[nodiscard]] bool take_label_map(const SourceVolume& source, VolumeImage& image,
-                                  const std::string& place);
+                                  const std::string& location);
 
 /// The longest side of a voxel over its shortest: thick slices have 50; in longer voxels a tool
 /// has more samples than the loop can count.

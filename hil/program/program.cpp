@@ -111,10 +111,10 @@ LinkHello hello_of(const EmulatorOptions& o) {
 
 /// Serves the clients of a port that is open already. One that wants another device is refused.
 template <class Server>
-void serve_clients(const EmulatorOptions& o, Server& server, const std::string& place,
+void serve_clients(const EmulatorOptions& o, Server& server, const std::string& location,
                    EmulatedDevice& device, FrontStats& stats, const ServeLimits& limits,
                    std::ostream& out, std::ostream& err) {
-  out << "kerf-emulator: " << o.device << " at " << escaped(place) << std::endl;
+  out << "kerf-emulator: " << o.device << " at " << escaped(location) << std::endl;
   do {
     auto client = server.accept(limits.stop, limits.left_ns(stats.cycles));
     if (!client) break;
@@ -133,8 +133,8 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
       device.advance(static_cast<int>(cycles_of(o.linger)));
       continue;
     }
-    if (!o.stay) throw HilError(place + ": " + link.refusal());
-    err << "kerf-emulator: " << place << ": " << link.refusal() << std::endl;
+    if (!o.stay) throw HilError(location + ": " + link.refusal());
+    err << "kerf-emulator: " << location << ": " << link.refusal() << std::endl;
   } while (o.stay && !limits.reached(stats.cycles));
 }
 
@@ -313,8 +313,8 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
     serve_websocket(o, device, limits, stats, out);
   } else if (o.front == "udp") {
     UdpServer server(o.udp);
-    const std::string place = "udp port " + std::to_string(server.port());
-    serve_clients(o, server, place, device, stats, limits, out, err);
+    const std::string location = "udp port " + std::to_string(server.port());
+    serve_clients(o, server, location, device, stats, limits, out, err);
   } else {
     SeqpacketServer server(o.socket);
     serve_clients(o, server, o.socket, device, stats, limits, out, err);

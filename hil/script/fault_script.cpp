@@ -67,9 +67,9 @@ DeviceFault fault_of(const ScriptTable& table) {
 
 }  // namespace
 
-FaultScript parse_fault_script(std::string_view text, const std::string& place) {
-  const TomlNode file = parse_script(text, place);
-  const ScriptTable top(file, place, "");
+FaultScript parse_fault_script(std::string_view text, const std::string& location) {
+  const TomlNode file = parse_script(text, location);
+  const ScriptTable top(file, location, "");
   top.allow_only({"seed", "clock", "latches", "seconds", "fault"});
   FaultScript script;
   constexpr double kMaxSeed = 4294967295.0;
@@ -80,7 +80,7 @@ FaultScript parse_fault_script(std::string_view text, const std::string& place) 
   script.seconds = top.number("seconds", script.seconds, {0.1, kMaxScriptSeconds});
   if (top.has("seconds") && !top.has("fault")) return script;  // all goes well, for so long
   for (const TomlNode& fault : top.tables("fault", kMaxFaults)) {
-    script.faults.push_back(fault_of(ScriptTable(fault, place, "fault")));
+    script.faults.push_back(fault_of(ScriptTable(fault, location, "fault")));
   }
   return script;
 }

@@ -68,12 +68,12 @@ HandStep step_of(const ScriptTable& table) {
 }
 
 /// Plant parameters of `[device]` and `[hand]`.
-PlantValues plant_of(const ScriptTable& top, const std::string& place) {
+PlantValues plant_of(const ScriptTable& top, const std::string& location) {
   PlantValues values;
   for (const std::string_view name : {"device", "hand"}) {
     const TomlNode* node = top.table(name);
     if (node == nullptr) continue;
-    const ScriptTable table(*node, place, std::string(name));
+    const ScriptTable table(*node, location, std::string(name));
     std::vector<std::string_view> known;
     for (std::size_t i = 0; i < values.size(); ++i) {
       const PlantKey& row = kPlantKeys[i];
@@ -90,17 +90,17 @@ PlantValues plant_of(const ScriptTable& top, const std::string& place) {
 
 }  // namespace
 
-HandScript parse_hand_script(std::string_view text, const std::string& place) {
-  const TomlNode file = parse_script(text, place);
-  const ScriptTable top(file, place, "");
+HandScript parse_hand_script(std::string_view text, const std::string& location) {
+  const TomlNode file = parse_script(text, location);
+  const ScriptTable top(file, location, "");
   top.allow_only({"unit_mm", "start_mm", "device", "hand", "step"});
   HandScript script;
   if (top.has("unit_mm")) script.unit_mm = top.number("unit_mm", 1, {0, kMaxUnitMm, true});
   script.start = top.numbers<3>("start_mm", script.start, kLength);
 
-  script.plant = plant_of(top, place);
+  script.plant = plant_of(top, location);
   for (const TomlNode& step : top.tables("step", kMaxSteps)) {
-    const ScriptTable table(step, place, "step");
+    const ScriptTable table(step, location, "step");
     script.steps.push_back(step_of(table));
     if (!table.flag("repeat")) continue;
     if (script.repeat_from) table.fail(": a second repeat; only one step starts the repeat");

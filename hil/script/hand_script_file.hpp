@@ -40,7 +40,7 @@ namespace kerf {
 /// and line. Start-up only.
 [[nodiscard]] HandScript read_hand_script(const std::filesystem::path& file);
 
-/// The same from text; `place` names it in errors.
-[[nodiscard]] HandScript parse_hand_script(std::string_view text, const std::string& place);
+/// The same from text; `location` names it in errors.
+[[nodiscard]] HandScript parse_hand_script(std::string_view text, const std::string& location);
 
 }  // namespace kerf

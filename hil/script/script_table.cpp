@@ -20,13 +20,13 @@ constexpr std::size_t kMaxBytes = 1 << 20;
 
 }  // namespace
 
-ScriptTable::ScriptTable(const TomlNode& node, std::string place, std::string name)
-    : node_(node), place_(std::move(place)), name_(std::move(name)) {}
+ScriptTable::ScriptTable(const TomlNode& node, std::string location, std::string name)
+    : node_(node), location_(std::move(location)), name_(std::move(name)) {}
 
 void ScriptTable::fail(const TomlNode& node, std::string_view key, const std::string& why) const {
   const std::string dot = name_.empty() || key.empty() ? "" : ".";
-  throw HilError(place_ + ":" + std::to_string(node.line) + ": " + name_ + dot + std::string(key) +
-                 why);
+  throw HilError(location_ + ":" + std::to_string(node.line) + ": " + name_ + dot +
+                 std::string(key) + why);
 }
 
 void ScriptTable::fail(const std::string& why) const {
@@ -102,42 +102,42 @@ std::span<const TomlNode> ScriptTable::tables(const std::string& key, std::size_
   const auto is_table = [](const TomlNode& entry) { return entry.form == TomlNode::Form::table; };
   if (list == nullptr || list->form != TomlNode::Form::array || list->entries.empty() ||
       !std::ranges::all_of(list->entries, is_table)) {
-    throw HilError(place_ + ": no " + key + "s; add at least one [[" + key + "]]");
+    throw HilError(location_ + ": no " + key + "s; add at least one [[" + key + "]]");
   }
   if (list->entries.size() > most) {
-    throw HilError(place_ + ": " + std::to_string(list->entries.size()) + " " + key +
+    throw HilError(location_ + ": " + std::to_string(list->entries.size()) + " " + key +
                    "s; use at most " + std::to_string(most));
   }
   return list->entries;
 }
 
-TomlNode parse_script(std::string_view text, const std::string& place) {
+TomlNode parse_script(std::string_view text, const std::string& location) {
   try {
     return parse_toml(text);
   } catch (const TomlError& error) {
-    throw HilError(place + ":" + std::to_string(error.line) + ": " + one_line(error.what()));
+    throw HilError(location + ":" + std::to_string(error.line) + ": " + one_line(error.what()));
   }
 }
 
 std::string read_script(const std::filesystem::path& file, const std::string& example) {
-  const std::string place = file.string();
+  const std::string location = file.string();
   std::error_code error;
-  if (const std::string why = access_error(file); !why.empty()) throw HilError(place + why);
+  if (const std::string why = access_error(file); !why.empty()) throw HilError(location + why);
   if (!std::filesystem::is_regular_file(file, error)) {
-    throw HilError(place + ": not a file; name one such as " + example);
+    throw HilError(location + ": not a file; name one such as " + example);
   }
   std::ifstream in(file, std::ios::binary);
   if (!in) {
-    throw HilError(place + ": " + std::generic_category().message(errno) + "; " +
+    throw HilError(location + ": " + std::generic_category().message(errno) + "; " +
                    remedy_for(errno, "check its rights"));
   }
   std::string text(kMaxBytes + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(in.gcount()));
   if (in.bad() || (!in.eof() && text.size() <= kMaxBytes)) {
-    throw HilError(place + ": cannot be read; check its rights");
+    throw HilError(location + ": cannot be read; check its rights");
   }
-  if (text.size() > kMaxBytes) throw HilError(place + ": more than 1 MiB; use a shorter one");
+  if (text.size() > kMaxBytes) throw HilError(location + ": more than 1 MiB; use a shorter one");
   return text;
 }
 

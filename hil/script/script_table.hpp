@@ -27,7 +27,7 @@ struct ScriptRange {
 class ScriptTable {
  public:
   /// `name` is empty for the whole file.
-  ScriptTable(const TomlNode& node, std::string place, std::string name);
+  ScriptTable(const TomlNode& node, std::string location, std::string name);
 
   [[noreturn]] void fail(const std::string& why) const;
   void allow_only(std::span<const std::string_view> keys) const;
@@ -57,12 +57,12 @@ class ScriptTable {
   void read_list(std::string_view key, std::span<double> into, ScriptRange range) const;
 
   const TomlNode& node_;
-  std::string place_;
+  std::string location_;
   std::string name_;
 };
 
-/// Text of `place` as TOML; throws `HilError` with place, line and reason.
-[[nodiscard]] TomlNode parse_script(std::string_view text, const std::string& place);
+/// Text of `location` as TOML; throws `HilError` with location, line and reason.
+[[nodiscard]] TomlNode parse_script(std::string_view text, const std::string& location);
 
 /// The whole of a regular file of at most 1 MiB; the error names `example` if there is none.
 [[nodiscard]] std::string read_script(const std::filesystem::path& file,

@@ -23,8 +23,8 @@
 
 namespace kerf {
 
-/// What is wrong with a file, a setting or a recording: one line, "place: value; way out". Thrown
-/// by all that reads and checks, and never by a tick.
+/// What is wrong with a file, a setting or a recording: one line, "location: value; way out".
+/// Thrown by all that reads and checks, and never by a tick.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

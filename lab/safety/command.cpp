@@ -218,21 +218,22 @@ const std::vector<std::string> kModelWords{"paper", "proxy"};     // as in Force
 const std::vector<std::string> kNumericWords{"fixed", "double"};  // as in NumericKind
 const std::vector<std::string> kPortWords{"socket", "ws"};
 
-std::vector<NamedScript> scripts_in(const std::string& place) {
+std::vector<NamedScript> scripts_in(const std::string& location) {
   std::vector<NamedScript> scripts;
   std::error_code error;
-  if (std::filesystem::is_regular_file(place, error)) {
-    scripts.push_back(
-        {.name = std::filesystem::path(place).stem().string(), .script = read_fault_script(place)});
+  if (std::filesystem::is_regular_file(location, error)) {
+    scripts.push_back({.name = std::filesystem::path(location).stem().string(),
+                       .script = read_fault_script(location)});
     return scripts;
   }
-  for (const auto& entry : std::filesystem::directory_iterator(place, error)) {
+  for (const auto& entry : std::filesystem::directory_iterator(location, error)) {
     if (entry.path().extension() != ".toml") continue;
     scripts.push_back(
         {.name = entry.path().stem().string(), .script = read_fault_script(entry.path())});
   }
   if (scripts.empty()) {
-    throw HilError("--scripts: " + place + ": no fault scripts there; name hil/faults or a file");
+    throw HilError("--scripts: " + location +
+                   ": no fault scripts there; name hil/faults or a file");
   }
   std::ranges::sort(scripts, {}, &NamedScript::name);
   return scripts;
@@ -345,7 +346,7 @@ std::vector<int> FaultsCommand::rates() const {
 }
 
 std::vector<Cell> FaultsCommand::cells() const {
-  const std::string place = find_scene_file(scene_);
+  const std::string location = find_scene_file(scene_);
   const HandScript script = read_hand_script(find_data_file(hand_));
   std::vector<Cell> cells;
   const bool by_service = port_ == "ws";
@@ -362,7 +363,7 @@ std::vector<Cell> FaultsCommand::cells() const {
       overrides.rate_hz = rate_hz;
       for (const std::string& numeric : numerics_) {
         overrides.numeric = named<NumericKind>(numeric, kNumericWords);
-        LoadedScene scene = load_scene(place, overrides);
+        LoadedScene scene = load_scene(location, overrides);
         HandScript hand = script;
         if (!hand.unit_mm) hand.unit_mm = hand_unit_mm(scene);
         if (scene.force.model == ForceModel::external) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `kerf record info` compares of a log, in NumPy: each function yields lines "place: value; remedy"."""
+"""What `kerf record info` compares of a log, in NumPy: each function yields lines "location: value; remedy"."""
 import json
 import zlib
 

@@ -55,7 +55,7 @@ PYBIND11_MODULE(_kerf, module) {
   static py::handle error = PyErr_NewExceptionWithDoc(
       "kerf.Error",
       "What is wrong with a file, a setting, an argument or a recording: one line, "
-      "\"place: value; way out\".",
+      "\"location: value; way out\".",
       PyExc_ValueError, nullptr);
   module.attr("Error") = error;
   py::register_exception_translator([](std::exception_ptr thrown) {

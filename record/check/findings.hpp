@@ -15,8 +15,8 @@ namespace kerf {
 
 struct SceneFacts;
 
-/// What is wrong in a recording, as it is found: lines "place: value; remedy". Knows the manifest,
-/// with which most is compared.
+/// What is wrong in a recording, as it is found: lines "location: value; remedy". Knows the
+/// manifest, with which most is compared.
 class Findings {
  public:
   /// Reads manifest.json. Throws `RecordError` as `read_manifest`.

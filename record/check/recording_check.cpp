@@ -138,11 +138,11 @@ class Check {
       return;
     }
     for (std::size_t v = 0; v < volumes.size(); ++v) {
-      const std::string place = "volumes[" + std::to_string(v) + "].";
+      const std::string location = "volumes[" + std::to_string(v) + "].";
       const SceneFacts::Volume& of_scene = scene_.volumes[v];
-      findings_.compare(volumes.at(v), "size_vox", place + "size_vox", of_scene.size_vox,
+      findings_.compare(volumes.at(v), "size_vox", location + "size_vox", of_scene.size_vox,
                         "scene.json");
-      findings_.compare(volumes.at(v), "spacing_mm", place + "spacing_mm", of_scene.spacing_mm,
+      findings_.compare(volumes.at(v), "spacing_mm", location + "spacing_mm", of_scene.spacing_mm,
                         "scene.json");
     }
   }

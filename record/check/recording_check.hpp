@@ -21,7 +21,7 @@ enum class CheckDepth { facts, rows, files };
 struct CheckedRecording {
   Manifest manifest;       ///< as `read_facts`
   ArmSummaries summaries;  ///< of the rows in the range, up to the first one that is damaged
-  /// One line each: "place: value; remedy".
+  /// One line each: "location: value; remedy".
   std::vector<std::string> problems;
   /// Lines of what a power cut took, which is no contradiction.
   std::vector<std::string> notes;

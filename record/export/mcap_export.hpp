@@ -29,9 +29,9 @@ namespace kerf {
 /// alone (web/page/mcap_log.js): manifest.json, scene.json, clock.npy, volumes/, inputs/, and as
 /// ticks.npy.head, ticks-2.npy.head the headers of the logs, whose rows are the messages' bytes
 /// behind the four of CDR; the count in them is that of the log, more than its rows if it was cut.
-/// A range of ticks has none. Returns one line, "place: value; remedy", for each file that is left
-/// out because it cannot be read, and if scene.json has no place of a device, without which there
-/// is no /tf.
+/// A range of ticks has none. Returns one line, "location: value; remedy", for each file that is
+/// left out because it cannot be read, and if scene.json has no place of a device, without which
+/// there is no /tf.
 ///
 /// Tip, force and frames come 100 times a second: the tick has all of them. Times are UTC by
 /// `clock`, or `start_ns` if that has no date; they do not fall, since one that would is that of

@@ -49,7 +49,7 @@
 /// for any mapped file); only its owner can do that.
 namespace kerf {
 
-/// A page that cannot be made, taken or trusted. One line: "place: value; remedy".
+/// A page that cannot be made, taken or trusted. One line: "location: value; remedy".
 class ArmPageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -69,39 +69,39 @@ void check_header(const SegmentHeader& header, std::uint64_t bytes) {
 }
 
 SegmentVolumeInfo check_volume(const VolumeDescriptor& in, std::size_t index, std::uint64_t bytes) {
-  const std::string place = "volume " + std::to_string(index) + " ";
+  const std::string location = "volume " + std::to_string(index) + " ";
   SegmentVolumeInfo out;
   out.grid = {in.nx, in.ny, in.nz};
   const std::uint64_t voxels = std::uint64_t{in.nx} * in.ny * in.nz;
-  require(voxels != 0, place + "extent", voxels, "at least one voxel");
-  require(in.log2_brick == kBrickLog2, place + "log2_brick", int{in.log2_brick},
+  require(voxels != 0, location + "extent", voxels, "at least one voxel");
+  require(in.log2_brick == kBrickLog2, location + "log2_brick", int{in.log2_brick},
           std::to_string(kBrickLog2));
-  require(in.bits_per_voxel == 8 * sizeof(Density), place + "bits_per_voxel",
+  require(in.bits_per_voxel == 8 * sizeof(Density), location + "bits_per_voxel",
           int{in.bits_per_voxel}, std::to_string(8 * sizeof(Density)));
   out.bricks = BrickGrid::of(out.grid);
   const auto axis = [](std::int32_t n) { return static_cast<std::uint32_t>(n); };
-  require(in.bricks_x == axis(out.bricks.bx), place + "bricks_x", in.bricks_x,
+  require(in.bricks_x == axis(out.bricks.bx), location + "bricks_x", in.bricks_x,
           std::to_string(out.bricks.bx));
-  require(in.bricks_y == axis(out.bricks.by), place + "bricks_y", in.bricks_y,
+  require(in.bricks_y == axis(out.bricks.by), location + "bricks_y", in.bricks_y,
           std::to_string(out.bricks.by));
-  require(in.bricks_z == axis(out.bricks.bz), place + "bricks_z", in.bricks_z,
+  require(in.bricks_z == axis(out.bricks.bz), location + "bricks_z", in.bricks_z,
           std::to_string(out.bricks.bz));
   const std::uint64_t count = std::uint64_t{in.bricks_x} * in.bricks_y * in.bricks_z;
-  require(count <= kMaxBricks, place + "bricks", count, "at most " + std::to_string(kMaxBricks));
-  require(in.brick_count == count, place + "brick_count", in.brick_count, std::to_string(count));
-  require(inside(in.off_versions, count, sizeof(std::uint64_t), bytes), place + "off_versions",
+  require(count <= kMaxBricks, location + "bricks", count, "at most " + std::to_string(kMaxBricks));
+  require(in.brick_count == count, location + "brick_count", in.brick_count, std::to_string(count));
+  require(inside(in.off_versions, count, sizeof(std::uint64_t), bytes), location + "off_versions",
           in.off_versions, "an array inside the memory");
-  require(inside(in.off_bricks, count, kBrickVoxels * sizeof(Density), bytes), place + "off_bricks",
-          in.off_bricks, "an array inside the memory");
+  require(inside(in.off_bricks, count, kBrickVoxels * sizeof(Density), bytes),
+          location + "off_bricks", in.off_bricks, "an array inside the memory");
   require(in.off_labels == 0 || inside(in.off_labels, voxels, sizeof(Label), bytes),
-          place + "off_labels", in.off_labels, "0 or an array inside the memory");
+          location + "off_labels", in.off_labels, "0 or an array inside the memory");
   float length2 = 0;
   for (const float part : in.orientation) length2 += part * part;
-  require(std::abs(length2 - 1) < 1e-3F, place + "orientation squared", length2, "1");
+  require(std::abs(length2 - 1) < 1e-3F, location + "orientation squared", length2, "1");
   for (std::size_t k = 0; k < 3; ++k) {
-    require(std::isfinite(in.spacing_mm[k]) && in.spacing_mm[k] > 0, place + "spacing_mm",
+    require(std::isfinite(in.spacing_mm[k]) && in.spacing_mm[k] > 0, location + "spacing_mm",
             in.spacing_mm[k], "a positive number");
-    require(std::isfinite(in.origin_mm[k]), place + "origin_mm", in.origin_mm[k], "a number");
+    require(std::isfinite(in.origin_mm[k]), location + "origin_mm", in.origin_mm[k], "a number");
   }
   std::copy_n(in.spacing_mm, 3, out.spacing_mm.begin());
   std::copy_n(in.origin_mm, 3, out.origin_mm.begin());

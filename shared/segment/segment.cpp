@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint64_t kPartAlignment = 4096;  // no two parts share a page or a cache line
 
 void check_source(const SegmentVolumeSpec& volume, std::size_t index) {
-  const std::string place = "segment: volume " + std::to_string(index) + ": ";
+  const std::string location = "segment: volume " + std::to_string(index) + ": ";
   const auto fits = [](std::int32_t n) {
     return n >= 1 && n <= std::numeric_limits<std::uint16_t>::max();
   };
@@ -25,26 +25,26 @@ void check_source(const SegmentVolumeSpec& volume, std::size_t index) {
   const std::string size = std::to_string(grid.nx) + " x " + std::to_string(grid.ny) + " x " +
                            std::to_string(grid.nz) + " voxels";
   if (!fits(grid.nx) || !fits(grid.ny) || !fits(grid.nz)) {
-    throw SegmentError(place + size + "; each edge is 1 to 65535");
+    throw SegmentError(location + size + "; each edge is 1 to 65535");
   }
   const BrickGrid bricks = BrickGrid::of(grid);
   const std::uint64_t count = std::uint64_t{static_cast<std::uint32_t>(bricks.bx)} *
                               static_cast<std::uint32_t>(bricks.by) *
                               static_cast<std::uint32_t>(bricks.bz);
   if (count > kMaxBricks) {
-    throw SegmentError(place + size + " is above 1024^3; crop or resample it");
+    throw SegmentError(location + size + " is above 1024^3; crop or resample it");
   }
   if (volume.density.size() != grid.voxel_count()) {
-    throw SegmentError(place + std::to_string(volume.density.size()) + " densities for " + size +
+    throw SegmentError(location + std::to_string(volume.density.size()) + " densities for " + size +
                        "; give one per voxel");
   }
   if (!volume.labels.empty() && volume.labels.size() != grid.voxel_count()) {
-    throw SegmentError(place + std::to_string(volume.labels.size()) + " labels for " + size +
+    throw SegmentError(location + std::to_string(volume.labels.size()) + " labels for " + size +
                        "; give none or one per voxel");
   }
   if (!std::all_of(volume.spacing_mm.begin(), volume.spacing_mm.end(),
                    [](double mm) { return std::isfinite(mm) && mm > 0; })) {
-    throw SegmentError(place + "spacing is not positive; give mm per voxel");
+    throw SegmentError(location + "spacing is not positive; give mm per voxel");
   }
 }
 

@@ -36,7 +36,7 @@ std::string in(const TemporaryFolder& folder, std::string line) {
 
 }  // namespace
 
-TEST_CASE("bad input is one line that names place, value and way out, and exit code 2") {
+TEST_CASE("bad input is one line that names location, value and way out, and exit code 2") {
   const TemporaryFolder folder;
   struct Bad {
     std::string line, part;

@@ -289,7 +289,7 @@ TEST_CASE(
                                  .offset_given = true,
                                  .limits = scene.limits,
                                  .hand_script = {},
-                                 .hand_place = {}};
+                                 .hand_location = {}};
   const auto servo = kerf::plan_scene(scene);
   const std::string json = kerf::canonical_json(scene);
   auto segment = kerf::SegmentWriter::create(kerf::segment_spec(scene, json, 0));

@@ -70,8 +70,8 @@ std::string found_gl(const std::string& missing) {
          (missing.empty() ? "" : " without " + missing);
 }
 
-std::string gl_is_too_old(const std::string& place, const std::string& found) {
-  return place + ": the driver has OpenGL " + found +
+std::string gl_is_too_old(const std::string& location, const std::string& found) {
+  return location + ": the driver has OpenGL " + found +
          ", and 4.5 is needed, or 3.3 with the extensions of docs/window.md; a browser needs "
          "neither: ./kerf demo --serve";
 }

@@ -41,8 +41,8 @@ inline constexpr std::array kAskedVersions{GlVersion{4, 5}, GlVersion{3, 3}};
 
 /// The current context's version and driver, for a message; `missing` as above.
 [[nodiscard]] std::string found_gl(const std::string& missing);
-/// Message where nothing but `found` is to be had; it begins with `place`.
-[[nodiscard]] std::string gl_is_too_old(const std::string& place, const std::string& found);
+/// Message where nothing but `found` is to be had; it begins with `location`.
+[[nodiscard]] std::string gl_is_too_old(const std::string& location, const std::string& found);
 
 /// A core context of OpenGL 4.5, or of 3.3 with the extensions that every picture needs, current on
 /// the thread that made it until it goes. One at a time.

@@ -79,27 +79,27 @@ std::string problem_with(const CameraPose& pose) {
 }
 
 CameraPose parse_camera_numbers(std::string_view text) {
-  const std::string place = "--camera: ";
+  const std::string location = "--camera: ";
   std::vector<double> numbers;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     const std::string_view word = text.substr(begin, end - begin);
     const auto number = number_in(word);
     if (!number) {
-      throw VisualizerError(place + "'" + one_line(word) + "' is no number; " + kNine);
+      throw VisualizerError(location + "'" + one_line(word) + "' is no number; " + kNine);
     }
     numbers.push_back(*number);
     begin = end + 1;
   }
   if (numbers.size() != 9) {
-    throw VisualizerError(place + std::to_string(numbers.size()) + " numbers; " + kNine);
+    throw VisualizerError(location + std::to_string(numbers.size()) + " numbers; " + kNine);
   }
   const auto at = [&](std::size_t i) {
     return glm::dvec3(numbers[i], numbers[i + 1], numbers[i + 2]);
   };
   const CameraPose pose{at(0), at(3), at(6)};
   if (const std::string problem = problem_with(pose); !problem.empty()) {
-    throw VisualizerError(place + problem);
+    throw VisualizerError(location + problem);
   }
   return pose;
 }

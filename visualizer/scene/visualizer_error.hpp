@@ -5,7 +5,7 @@
 
 namespace kerf {
 
-/// Anything that ends the visualizer: one line that names the place, the value and the way out.
+/// Anything that ends the visualizer: one line that names the location, the value and the way out.
 class VisualizerError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -34,7 +34,7 @@ std::filesystem::path labels_path(const std::filesystem::path& volume_path) {
 
 SharedBytes read_in_sandbox(const SandboxJob& job, const std::function<void(SandboxReader&)>&,
                             const std::function<std::size_t(std::span<const std::byte>)>&) {
-  refuse_file(job.place);
+  refuse_file(job.location);
 }
 std::span<std::byte> SandboxReader::offer(std::span<const std::byte>) {
   return {};

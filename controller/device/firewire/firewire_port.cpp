@@ -73,23 +73,25 @@ void FirewirePort::find(const FirewireOptions& options, int patience_ms,
 }
 
 void FirewirePort::connect(const std::atomic<bool>& stop) {
-  const std::string place = "--port fw: " + device_.path + ": ";
+  const std::string location = "--port fw: " + device_.path + ": ";
   if (const int error = requests_.open(device_.path); error != 0) {
-    throw std::runtime_error(place + std::generic_category().message(error) +
+    throw std::runtime_error(location + std::generic_category().message(error) +
                              "; give your user the right to it");
   }
   const auto control = requests_.read_byte(kControl);
   if (!control) {
-    throw std::runtime_error(place + "the device does not answer; unplug it and plug it in again");
+    throw std::runtime_error(location +
+                             "the device does not answer; unplug it and plug it in again");
   }
   control_ = *control;
   claim();
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(kConnectMs);
   while (state_ != State::streaming) {
     if (closed_ || stop || std::chrono::steady_clock::now() >= give_up) {
-      throw std::runtime_error(place + (state_ == State::claiming
-                                            ? "no channel or bandwidth; end what uses the bus"
-                                            : "no stream starts; unplug the device and try again"));
+      throw std::runtime_error(location +
+                               (state_ == State::claiming
+                                    ? "no channel or bandwidth; end what uses the bus"
+                                    : "no stream starts; unplug the device and try again"));
     }
     static_cast<void>(requests_.ready(10));
     tend();

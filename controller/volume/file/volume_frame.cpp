@@ -74,14 +74,14 @@ std::string spacing_text(const std::array<double, 3>& mm, std::uint32_t known,
   return text;
 }
 
-[[noreturn]] void refuse_unspaced(const std::string& place, const std::array<double, 3>& mm,
+[[noreturn]] void refuse_unspaced(const std::string& location, const std::array<double, 3>& mm,
                                   std::uint32_t known, const std::string& bad) {
   std::string axes;
   for (std::size_t axis = 0; known != 0 && axis < 3; ++axis) {
     if ((known >> axis & 1) != 0) continue;
     axes += (axes.empty() ? " along " : ", ") + std::string(1, kAxisLetters[axis]);
   }
-  throw LoadError(place + ": spacing" + axes +
+  throw LoadError(location + ": spacing" + axes +
                   (bad.empty() ? " is not in the file" : " cannot be read from " + bad) +
                   "; add `spacing_mm = [" + spacing_text(mm, known, ", ") +
                   "]` to the scene or `--spacing " + spacing_text(mm, known, ",") + "` (mm)");
@@ -89,7 +89,7 @@ std::string spacing_text(const std::array<double, 3>& mm, std::uint32_t known,
 
 }  // namespace
 
-void take_spacing(const std::string& place, const ReadOptions& options,
+void take_spacing(const std::string& location, const ReadOptions& options,
                   const UntrustedHeader& claim, SourceVolume& volume) {
   const std::uint32_t in_file = claim.spacing_known & kAllAxes;
   std::array<double, 3> mm{1, 1, 1};
@@ -100,17 +100,17 @@ void take_spacing(const std::string& place, const ReadOptions& options,
   if (options.override_spacing_mm) {
     volume.spacing_known = kAllAxes;
     volume.spacing_mm = *options.override_spacing_mm;
-    check_spacing(place, volume.spacing_mm, kOverride);
+    check_spacing(location, volume.spacing_mm, kOverride);
     add_sentence(volume.note,
                  "OVERRIDDEN: spacing " + spacing_text(volume.spacing_mm, kAllAxes, " x ") +
                      " mm in place of the file's " +
                      (in_file == 0 ? "none" : spacing_text(mm, in_file, " x ") + " mm"));
     return;
   }
-  check_spacing(place, mm, kOverride);
+  check_spacing(location, mm, kOverride);
   if (options.spacing_mm) {
     const std::array<double, 3>& given = *options.spacing_mm;
-    check_spacing(place, given);
+    check_spacing(location, given);
     const std::array<std::int32_t, 3> count{volume.grid.nx, volume.grid.ny, volume.grid.nz};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if ((in_file >> axis & 1) == 0) {
@@ -118,7 +118,7 @@ void take_spacing(const std::string& place, const ReadOptions& options,
       } else if (!is_same(mm[axis], given[axis])) {
         const std::string both = mm_text(given[axis]) + " mm along " + kAxisLetters[axis];
         if (!is_rounded(mm[axis], given[axis], count[axis])) {
-          throw LoadError(place + ": spacing " + both + " is given, and the file has " +
+          throw LoadError(location + ": spacing " + both + " is given, and the file has " +
                           mm_text(mm[axis]) + "; leave it out, or replace the file's with " +
                           kOverride);
         }
@@ -129,7 +129,7 @@ void take_spacing(const std::string& place, const ReadOptions& options,
     volume.spacing_known = kAllAxes;
   } else if (in_file != kAllAxes && !options.allow_missing_spacing) {
     const std::string bad(claim.bad_spacing.begin(), std::ranges::find(claim.bad_spacing, '\0'));
-    refuse_unspaced(place, mm, in_file, escaped(bad));
+    refuse_unspaced(location, mm, in_file, escaped(bad));
   }
   volume.spacing_mm = mm;
 }
@@ -148,8 +148,8 @@ std::size_t nearest(const vec3::Vec& axis) {
 
 /// Directions in LPS from three letters, one of each pair: L or R (left, right of the body), P or A
 /// (back, front), S or I (top, bottom). An axis leads toward its letter, as in NRRD and nibabel; in
-/// any case. Throws LoadError, which begins with `place`.
-std::array<vec3::Vec, 3> axes_from(const std::string& place, const std::string& letters) {
+/// any case. Throws LoadError, which begins with `location`.
+std::array<vec3::Vec, 3> axes_from(const std::string& location, const std::string& letters) {
   std::array<vec3::Vec, 3> axes{};
   std::array<bool, 3> taken{};
   for (std::size_t axis = 0; axis < letters.size() && letters.size() == 3; ++axis) {
@@ -161,19 +161,19 @@ std::array<vec3::Vec, 3> axes_from(const std::string& place, const std::string& 
     axes[axis][at % 3] = at < 3 ? 1 : -1;
   }
   if (std::ranges::all_of(taken, [](bool is) { return is; })) return axes;
-  throw LoadError(place + ": " + one_line(letters) +
+  throw LoadError(location + ": " + one_line(letters) +
                   " is not three letters, one of L R, one of P A and one of S I; give where "
                   "columns, rows and slices lead in the body, such as LPS");
 }
 
 }  // namespace
 
-std::string take_axes(const std::string& place, const std::string& letters,
+std::string take_axes(const std::string& location, const std::string& letters,
                       volume::UntrustedHeader& claim) {
   if (!letters.empty()) {
     const auto given = axes_from("--axes", letters);
     if (claim.axes_known != 0) {
-      throw LoadError("--axes: " + place + " has axes of its own; leave it out");
+      throw LoadError("--axes: " + location + " has axes of its own; leave it out");
     }
     claim.axes = given;
     return {};

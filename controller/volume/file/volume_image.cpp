@@ -12,10 +12,10 @@
 
 namespace kerf {
 
-void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std::int64_t nz,
+void check_grid(const std::string& location, std::int64_t nx, std::int64_t ny, std::int64_t nz,
                 const char* way_out) {
   std::ostringstream size;
-  size << place << ": " << nx << " x " << ny << " x " << nz;
+  size << location << ": " << nx << " x " << ny << " x " << nz;
   if (nx <= 0 || ny <= 0 || nz <= 0) {
     throw LoadError(size.str() + " voxels is empty; every extent must be at least 1");
   }
@@ -27,14 +27,14 @@ void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std:
   }
 }
 
-void check_spacing(const std::string& place, const std::array<double, 3>& spacing_mm,
+void check_spacing(const std::string& location, const std::array<double, 3>& spacing_mm,
                    const char* way_out) {
   constexpr double kSmallestMm = 1e-6;
   constexpr double kLargestMm = 1e3;
   for (const double s : spacing_mm) {
     if (s >= kSmallestMm && s <= kLargestMm) continue;
     std::ostringstream text;
-    text << place << ": " << spacing_mm[0] << " " << spacing_mm[1] << " " << spacing_mm[2]
+    text << location << ": " << spacing_mm[0] << " " << spacing_mm[1] << " " << spacing_mm[2]
          << " mm is not a voxel size; give three positive numbers of mm with " << way_out;
     throw LoadError(text.str());
   }

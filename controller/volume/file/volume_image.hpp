@@ -40,14 +40,14 @@ struct VolumeImage : VolumeFrame {
 inline constexpr std::int64_t kMaxVoxelsPerAxis = 1024;
 inline constexpr std::int64_t kMaxVoxels = std::int64_t{512} << 20;
 
-/// Throws LoadError if an extent is not positive or above the limits. `place` begins the message;
-/// `way_out` ends it if the extents are too large.
-void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std::int64_t nz,
+/// Throws LoadError if an extent is not positive or above the limits. `location` begins the
+/// message; `way_out` ends it if the extents are too large.
+void check_grid(const std::string& location, std::int64_t nx, std::int64_t ny, std::int64_t nz,
                 const char* way_out = "crop or resample it first");
 
-/// Throws LoadError unless each spacing is finite and within 1 nm .. 1 m. `place` and `way_out` as
-/// above.
-void check_spacing(const std::string& place, const std::array<double, 3>& spacing_mm,
+/// Throws LoadError unless each spacing is finite and within 1 nm .. 1 m. `location` and `way_out`
+/// as above.
+void check_spacing(const std::string& location, const std::array<double, 3>& spacing_mm,
                    const char* way_out = "`spacing_mm = [..]` in the scene or `--spacing`");
 
 /// Type of the values of a file in memory: the smallest that holds each value exactly, or nearest.

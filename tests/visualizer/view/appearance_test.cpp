@@ -167,7 +167,7 @@ TEST_CASE("opacities come back from a file as they went, whatever a material is 
   CHECK(parse_transfer("opacity = {pulp = 1}", "t.toml") == Opacities{{"pulp", 1.0}});
 }
 
-TEST_CASE("a bad transfer function is refused in one line: place, value, way out") {
+TEST_CASE("a bad transfer function is refused in one line: location, value, way out") {
   CHECK(refusal_of("") == "t.toml: there is no table [opacity]; write one");
   CHECK(refusal_of("[opacity]\nenamel = 1.5") ==
         "t.toml:2: opacity.enamel = 1.5 is no opacity; give a number from 0 to 1");
