@@ -42,10 +42,10 @@ class CompiledSceneOf final : public CompiledScene {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_laws(scene, plan_);
-    plan_.kernel = scene.servo.kernel;
+    plan_.gradient_kernel = scene.servo.kernel;
     plan_.taps = &exact_taps(scene.servo.kernel);
     plan_.kernels = &kernels;
-    plan_.cutting =
+    plan_.overlap_cuts =
         scene.cut.model == CutModel::overlap || scene.cut.model == CutModel::overlap_exact;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);

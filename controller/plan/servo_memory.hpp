@@ -321,8 +321,8 @@ class ServoMemory {
       gradients_[v].resize(lengths.gradients[v]);
       for (ArmCarries<N>& of_arm : carries_) of_arm[v].resize(lengths.carry[v]);
       if (!gradients_[v].empty()) {
-        refresh_gradients<N>(plan.kernel, volume.grid, density, volume.grid.box(), gradients_[v],
-                             *scratch);
+        refresh_gradients<N>(plan.gradient_kernel, volume.grid, density, volume.grid.box(),
+                             gradients_[v], *scratch);
       }
       if (cuts_) {
         firsts_[v] = density;

@@ -132,12 +132,12 @@ ContactResult<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
       out.modification_n = friction_of_last_cut(plan, state, out);
       out.tip_torque_n_mm = out.tip_torque_n_mm + cross(out.head_lever_mm, out.modification_n);
     }
-    if (!plan.cutting) return out;
+    if (!plan.overlap_cuts) return out;
   }
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const VolumeTick<N> at{plan, state, v,
                            tool_pose(plan.volumes[v], tool, tool.in_volume[v], tip_mm, rotation)};
-    if (at.cuts()) keep_bricks(plan, state, v, at.pose.centre_vox);
+    if (at.overlap_cuts()) keep_bricks(plan, state, v, at.pose.centre_vox);
     const VolumeForces<N> in_volume =
         by_method<N>(tool.in_volume[v].method, [&](auto step) { return step.contact_and_cut(at); });
     out.contact_n = out.contact_n - in_volume.contact_n;

@@ -43,7 +43,7 @@ void cut(const VolumeTick<N>& at, std::span<const Gradient<N>> gradient,
                       modification_sum<N>(at.grid(), gradient, memory.density, at.state.overlap));
   forces.removed =
       remove<N>(at.grid(), memory.density, at.state.overlap, at.plan.removal_rate, memory.carry);
-  refresh_gradients<N>(at.plan.kernel, at.grid(), memory.density, forces.removed.changed,
+  refresh_gradients<N>(at.plan.gradient_kernel, at.grid(), memory.density, forces.removed.changed,
                        memory.gradient, *at.state.gradient_scratch);
 }
 
@@ -56,7 +56,7 @@ VolumeForces<N> AlignedStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcep
   if (!at.plan.contact.swept) {
     forces.contact_n = force_of_sum<N>(at.in_volume().contact, tick.contact());
   }
-  if (!at.cuts()) return forces;
+  if (!at.overlap_cuts()) return forces;
   const AlignedTick::Milled milled = tick.mill(at.plan.removal_rate, at.memory().carry);
   forces.modification_n = force_of_sum<N>(at.in_volume().modification, milled.modification);
   forces.removed = milled.removed;
@@ -87,7 +87,7 @@ VolumeForces<N> GatherStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcept
       forces.contact_n = force_of_sum<N>(
           in_volume.contact, contact_sum<N>(at.grid(), gradient, at.tool().offsets, at.pose));
     }
-    if (at.cuts()) cut(at, gradient, forces);
+    if (at.overlap_cuts()) cut(at, gradient, forces);
   }
   return forces;
 }
@@ -116,7 +116,7 @@ VolumeForces<N> SplatStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcept 
   if (!at.plan.contact.swept) {
     forces.contact_n = force_of_sum<N>(in_volume.contact, felt.contact);
   }
-  if (!at.cuts()) return forces;
+  if (!at.overlap_cuts()) return forces;
   forces.modification_n = force_of_sum<N>(in_volume.modification, felt.modification);
   forces.removed = tick.cut(at.plan.removal_rate, at.memory().carry);
   return forces;

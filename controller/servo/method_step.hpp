@@ -26,8 +26,8 @@ struct VolumeTick {
   [[nodiscard]] const ToolInVolume<N>& in_volume() const noexcept { return tool().in_volume[v]; }
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return plan.volumes[v].grid; }
   [[nodiscard]] VolumeState<N>& memory() const noexcept { return state.volumes[v]; }
-  /// Whether the tool cuts by overlap, which needs no force. False while the pedal is up.
-  [[nodiscard]] bool cuts() const noexcept { return plan.cutting && state.pedal_down; }
+  /// Whether overlap removes material in this tick. False while the pedal is up.
+  [[nodiscard]] bool overlap_cuts() const noexcept { return plan.overlap_cuts && state.pedal_down; }
 };
 
 /// The forces of one volume at the device port, and the removal in it. The forces point along the

@@ -246,12 +246,12 @@ struct ServoPlan {
   std::size_t tool_count = 0;
   std::array<ToolPlan<N>, kMaxTools> tools{};
 
-  GradientKernel kernel = GradientKernel::farid;
-  const ExactTaps* taps = nullptr;     ///< of the kernel, for the method `splat`
+  GradientKernel gradient_kernel = GradientKernel::farid;
+  const ExactTaps* taps = nullptr;     ///< of that kernel, for the method `splat`
   const KernelSet* kernels = nullptr;  ///< of this machine
   ContactPlan<N> contact;
-  ExternalPlan<N> external;  ///< in place of contact
-  bool cutting = false;      ///< by overlap, whatever the force
+  ExternalPlan<N> external;   ///< in place of contact
+  bool overlap_cuts = false;  ///< by overlap, whatever the force
   RemovalRate<N> removal_rate;
   ForceCutPlan<N> force_cut;  ///< else, by force
 

@@ -491,7 +491,7 @@ bool apply_command(Arms<N> arms, const ServoCommand& command) noexcept {
       for (const Arm<N>& arm : arms) arm.state->hold = command.argument != 0;
       return true;
     case ServoCommand::Kind::reset:
-      history.reset.runs = plan.cutting || plan.force_cut.on;
+      history.reset.runs = plan.overlap_cuts || plan.force_cut.on;
       forget_strokes(history.stroke);  // their bricks are among those that were cut
       return true;
     case ServoCommand::Kind::undo:

@@ -103,7 +103,8 @@ VoxelBox restore_bricks(const ServoPlan<N>& plan, const VoxelGrid& grid, std::si
       }
     }
     if (!volume.gradient.empty()) {
-      refresh_gradients<N>(plan.kernel, grid, volume.density, box, volume.gradient, *scratch);
+      refresh_gradients<N>(plan.gradient_kernel, grid, volume.density, box, volume.gradient,
+                           *scratch);
     }
     restored = restored.united(box);
   }
@@ -332,7 +333,7 @@ VoxelBox swap_brick(const ServoPlan<N>& plan, KeptBrick& kept, ServoState<N>& st
     }
   }
   if (!volume.gradient.empty()) {
-    refresh_gradients<N>(plan.kernel, grid, volume.density, box, volume.gradient,
+    refresh_gradients<N>(plan.gradient_kernel, grid, volume.density, box, volume.gradient,
                          *state.gradient_scratch);
   }
   return box;
