@@ -10,7 +10,7 @@
 #include "shared/wire/personality.hpp"
 
 // What `./kerf demo` hands from a scene to `kerf-emulator` and back. Both numbers go through texts
-// there, so they are rounded here as there: the same run, to the bit.
+// there, so they are rounded here, too: the runs are equal to the bit.
 
 namespace kerf {
 

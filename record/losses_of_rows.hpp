@@ -29,7 +29,7 @@ class LossesOfRows {
   /// Rows so far.
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
 
-  /// The same losses as a manifest has them, at most so many gaps.
+  /// The losses for a manifest, with at most so many gaps.
   [[nodiscard]] RecordLosses as_losses(std::size_t most_gaps) const;
 
  private:

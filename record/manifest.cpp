@@ -211,7 +211,7 @@ class Members {
                                   " is " + is + ", and not " + std::string(kind) +
                                   std::string(kWayToNewManifest));
   }
-  /// The same, if it has the member.
+  /// Takes the member if it is there.
   template <class Read>
   void take_if_there(std::string_view key, std::string_view kind, const Read& read) const {
     if (json_.contains(key)) take(key, kind, read);

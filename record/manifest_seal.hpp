@@ -16,7 +16,7 @@ namespace kerf {
 /// The checksum of a regular file's bytes, as 8 hexadecimal digits; empty if it cannot be read.
 [[nodiscard]] std::string crc32_of_file(const std::filesystem::path& path);
 
-/// The same of bytes.
+/// The checksum of bytes, as 8 hexadecimal digits.
 [[nodiscard]] std::string crc32_of_bytes(std::string_view bytes);
 
 /// The names in `folder` of the files below a folder of a recording, as "volumes/NAME". In order.

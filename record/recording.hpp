@@ -59,7 +59,7 @@ void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest
 /// The summary as text in two columns.
 [[nodiscard]] std::string to_text(const RecordSummary& summary);
 
-/// The same figures as JSON, and the date of the first row; empty: null.
+/// The summary as JSON, and the date of the first row; empty: null.
 [[nodiscard]] std::string to_json(const RecordSummary& summary, std::string_view date = {});
 
 /// Writes the rows of an arm of the recording in `folder` as CSV, whole or not at all: one column

@@ -136,7 +136,7 @@ class TickLogReader {
   /// first one.
   [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows);
 
-  /// The same, but returns 0 and sets `problem` to the line. Leaves `problem` as it is otherwise.
+  /// Reads without an exception: on failure returns 0 and sets `problem` to the line.
   [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows,
                                  std::string& problem);
 

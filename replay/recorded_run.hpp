@@ -40,7 +40,7 @@ struct RecordedRun {
 
   LoadedScene scene;       ///< without its densities, which the servo has
   std::string canonical;   ///< `canonical_json` of it
-  std::string scene_json;  ///< the same with its source
+  std::string scene_json;  ///< `canonical` and the scene's source
   std::unique_ptr<CompiledScene> servo;
   std::uint64_t volume_chain = kFnv1aBasis;  ///< of the ticks before those of the log
   std::optional<SegmentWriter> segment;      ///< with the volumes at the start; if requested

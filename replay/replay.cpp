@@ -96,7 +96,7 @@ class ReplayLog {
   std::filesystem::path out_, from_;
   Json volumes_ = Json::List{};                       ///< as the manifest has them
   std::vector<std::unique_ptr<TickLogWriter>> logs_;  ///< by arm
-  std::vector<SummaryBuilder> summaries_;             ///< likewise
+  std::vector<SummaryBuilder> summaries_;             ///< by arm
 };
 
 std::uint64_t volume_hash_of(const RecordedRun& run) {

@@ -56,7 +56,7 @@ class RecordedTicks {
   /// Replaces `rows` by the next ones from `first` on, at most TickLogReader::kChunkRows; throws as
   /// TickLogReader::read, and for rows that are not of one tick.
   void read(std::uint64_t first, std::vector<ArmRecords>& rows);
-  /// The same, but returns the line; `rows` is empty then. Empty: they were read.
+  /// Reads without an exception: on failure `rows` is empty, and it returns the line.
   [[nodiscard]] std::string try_read(std::uint64_t first, std::vector<ArmRecords>& rows);
 
   /// Why a replay that reached the last row is incomplete: the header counts more rows. Empty if it

@@ -65,7 +65,7 @@ class EmulatedArm {
   [[nodiscard]] const Pose& pose() const noexcept { return history_[newest_]; }
   /// Mean velocity over the poses of the last `window_s`, mm/s; empty with fewer than two of them.
   [[nodiscard]] std::optional<DeviceVec<double>> velocity(double window_s) const noexcept;
-  /// Likewise of the rotation, rad/s.
+  /// Mean angular velocity over these poses, rad/s; zero with fewer than two of them.
   [[nodiscard]] DeviceVec<double> angular_velocity(double window_s) const noexcept;
   /// The emulator has ended, or has not sent a report for kSilenceS: of the clock, or of the ticks
   /// of lock-step. Each time that it comes to this is counted.

@@ -85,7 +85,7 @@ struct Settings {
 /// of the list is none.
 [[nodiscard]] std::string refusal_of_switch(std::string_view word);
 
-/// Those of the environment; throws likewise, also if the variable is not set.
+/// The settings in the environment. Throws std::invalid_argument, also if the variable is not set.
 [[nodiscard]] Settings settings_of_environment();
 
 }  // namespace kerf::standin

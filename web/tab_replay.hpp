@@ -10,12 +10,13 @@
 
 namespace kerf::web {
 
-/// A recording, replayed in the tab: each tick is compared, the first time that it is reached, with
-/// the recorded one, as kerf-replay does, and published to the page. Its files are read as of any
-/// folder; the worker has them (web/page/log_files.js).
+/// Replays a recording in a browser's tab: publishes each tick to the page, and compares it with
+/// the recorded one when it is reached for the first time. The comparison is that of kerf-replay.
+/// The files of the recording are in a folder that the worker provides (web/page/log_files.js).
 ///
-/// The order: construct; then in turn `prepare` until it returns true, `step`, `go`, and the
-/// messages of TabViewer. No call but the constructor takes long.
+/// Construct it, then call `prepare` until it returns true. From then on call `step`, `go` and the
+/// functions of TabViewer in any order; after `go`, `prepare` again. Only the constructor takes
+/// long.
 class TabReplay {
  public:
   /// Reads manifest and scene, loads and plans it: a second or two. Throws RecordError, LoadError
@@ -25,22 +26,23 @@ class TabReplay {
   TabReplay(const TabReplay&) = delete;
   TabReplay& operator=(const TabReplay&) = delete;
 
-  /// At most `ticks` of those that come before a tick is shown: in a flight recording the ticks
-  /// before its first one, later those on the way to the tick of `go`. Returns whether all are
+  /// Computes up to `ticks` ticks that are not shown: at first, in a flight recording, the ticks
+  /// before its first one; later those on the way to the tick of `go`. Returns whether all are
   /// done. Throws RecordError for damaged inputs.
   [[nodiscard]] bool prepare(int ticks);
 
   /// Publishes up to `ticks` ticks and returns how many. Stops at the end of the recording, or
   /// after the first tick that differs. Call only after `prepare` has returned true.
   int step(int ticks);
-  /// Whether the last `step` or `prepare` met the first difference, or `step` the end.
+  /// Whether the last `step` or `prepare` found the first difference, or `step` the end.
   [[nodiscard]] bool stopped() const noexcept;
 
-  /// To that tick, by `prepare`. Before the first `prepare` is done it does nothing.
+  /// Continues at `tick`: the next calls of `prepare` compute the ticks on the way. Does nothing
+  /// until `prepare` has returned true for the first time.
   void go(Tick tick);
 
   [[nodiscard]] TabViewer& viewer() noexcept;
-  /// In place of the viewer's. A slot without a step is a sign of life, too.
+  /// Call it instead of the viewer's `slot`. A slot without a step shows that the replay runs, too.
   void slot(bool ended);
 
   [[nodiscard]] int rate_hz() const noexcept;

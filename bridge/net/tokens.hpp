@@ -27,7 +27,7 @@ class Tokens {
 
   /// In constant time: compares the digests of all tokens, each to its end.
   [[nodiscard]] Right right_of(std::string_view token) const noexcept;
-  /// The same for a value of `cookie_for`.
+  /// The right of a cookie, a value of `cookie_for`; in constant time.
   [[nodiscard]] Right right_of_cookie(std::string_view cookie) const noexcept;
 
   [[nodiscard]] bool may_command() const noexcept {

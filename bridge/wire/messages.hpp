@@ -71,9 +71,9 @@ struct HelloMessage {
   std::uint32_t protocol;  ///< version of this protocol
   std::uint64_t session;   ///< of the run: `SegmentHeader::session_id`
   std::uint64_t config_hash;
-  std::uint64_t abi_hash;      ///< of the layout; a viewer that reads records needs the same one
-  std::uint32_t layout_major;  ///< likewise
-  std::uint32_t layout_minor;  ///< likewise
+  std::uint64_t abi_hash;      ///< of the layout; a viewer that reads records needs an equal one
+  std::uint32_t layout_major;  ///< must equal the viewer's, if it reads records
+  std::uint32_t layout_minor;  ///< must equal the viewer's, if it reads records
   std::uint32_t tick_ns;
   std::uint32_t flags;
   std::int64_t server_ns;  ///< when the message was written

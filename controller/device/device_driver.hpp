@@ -68,7 +68,7 @@ class DeviceDriver {
   /// Motors off for good: every later command is neutral too. As `release`.
   bool stay_released() noexcept;
 
-  /// The same by `send_last` of the port, for a process that may be about to end.
+  /// `stay_released` by `send_last` of the port, for a process that may be about to end.
   bool release_for_good() noexcept;
 
   [[nodiscard]] bool wait(int milliseconds) noexcept { return port_.wait(milliseconds); }

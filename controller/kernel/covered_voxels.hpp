@@ -407,7 +407,7 @@ template <class N>
   return found;
 }
 
-/// The same for groups, with the same bits.
+/// `loads` of groups; gives the bits of the function above.
 [[nodiscard]] inline CoveredLoads<FixedNumbers> loads(const CoveredGroups& covered,
                                                       const AheadForm<std::int64_t>& form,
                                                       std::span<const Density> density,

@@ -105,7 +105,7 @@ template <class N>
   }
 }
 
-/// The same as a number of the loop.
+/// part / whole as a number of the loop.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit unit_fraction_of(CutWeight<N> part,
                                                           CutWeight<N> whole) noexcept {

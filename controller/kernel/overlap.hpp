@@ -174,7 +174,7 @@ constexpr void for_each_row(const VoxelGrid& /*grid*/, const BoxOverlap& overlap
   }
 }
 
-/// The same for the ratios of `overlap`.
+/// Calls `row` for each row of the voxels whose ratios are in `overlap`.
 template <class N, class Row>
 constexpr void for_each_row(const VoxelGrid& grid, const OverlapBox<N>& overlap, Row&& row) {
   const VoxelBox box = overlap.box.clipped(grid.box());

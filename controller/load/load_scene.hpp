@@ -84,12 +84,12 @@ struct RecordedInputs {
   std::vector<std::pair<std::string, ToolMesh>> meshes{};  ///< by the name of the tool
 };
 
-/// The same with the text that the file has, or had.
+/// Loads a scene from `text`, which the file at `path` has, or had.
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
                                      const SceneOverrides& overrides, RecordedInputs recorded = {});
 
-/// The same before files are written: a scene whose text will be written to `path`, and the
-/// densities and labels of its first volume, whose window there is [0, 65535].
+/// Loads a scene before its files are written: a scene whose text will be written to `path`, and
+/// the densities and labels of its first volume, whose window there is [0, 65535].
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
                                      VolumeImage first, const SceneOverrides& overrides = {});
 

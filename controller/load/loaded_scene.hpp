@@ -46,7 +46,7 @@ struct LoadedScene : SceneSettings {
   std::size_t active_tool = 0;
   std::size_t second_tool = 0;           ///< of the second arm
   std::vector<VolumeSpec> volume_specs;  ///< as written in the file and on the command line
-  std::vector<ToolSpec> tool_specs;      ///< the same, with the sizes in effect
+  std::vector<ToolSpec> tool_specs;      ///< as written, with the sizes in effect
 };
 
 [[nodiscard]] inline std::size_t arms_of(const SceneSettings& scene) noexcept {

@@ -74,8 +74,8 @@ struct RunRecord : ArmRecord {
   std::array<std::uint64_t, kMaxVolumes> removed_steps{};       ///< by volume, since the last reset
   std::array<std::uint64_t, kMostForbidden> forbidden_ticks{};  ///< by material, since then too
   std::uint64_t resets = 0;  ///< of the volumes; before arming too
-  std::uint64_t undos = 0;   ///< of the last stroke each
-  std::uint64_t redos = 0;   ///< likewise
+  std::uint64_t undos = 0;   ///< each restored the volumes before the last stroke
+  std::uint64_t redos = 0;   ///< each repeated a stroke that was undone
   std::uint64_t allocations = 0;
   ThreadFaults faults_of_pages;
 

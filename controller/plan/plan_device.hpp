@@ -147,7 +147,7 @@ inline double tip_noise_mm(Personality personality) {
 /// which a hand holds WoodenHaptics in its home pose. A Falcon has no dock: its button may be held
 /// at any pose.
 inline constexpr double kDockPlayRad = 0.025;
-/// The same for a Cartesian device with an inkwell: those 3 mm.
+/// Play in the inkwell of a Cartesian device, at the wrist.
 inline constexpr double kDockPlayMm = 3;
 
 /// How far the counter of an axis at rest may move: two counts of an encoder, or two steps of the
@@ -157,7 +157,7 @@ inline std::int32_t rest_counts(Personality personality) {
   return figures ? std::max(2, 2 * figures->quantum_um / figures->step_um) : 2;
 }
 
-/// The same in counts; `anywhere` for a device without a dock.
+/// The play of the dock in counts; `anywhere` for a device without a dock.
 inline std::int32_t dock_counts(Personality personality, double per_count, std::int32_t anywhere) {
   if (!kind_of(personality).has_dock) return anywhere;
   return static_cast<std::int32_t>((is_cartesian(personality) ? kDockPlayMm : kDockPlayRad) /

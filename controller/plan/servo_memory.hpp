@@ -147,7 +147,7 @@ class ContactMemory {
                 support_deficit_mm(tool.mesh, close));
   }
 
-  /// The same for the parts behind the tool's head.
+  /// Holds the samples of the parts behind the tool's head.
   ShaftParts<N> hold_shaft(const LoadedScene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
     ShaftParts<N> shaft;

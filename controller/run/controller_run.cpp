@@ -90,7 +90,7 @@ std::string waits_of(const Run& run, std::size_t arm, Waiting waiting) {
   return "arm " + std::to_string(arm + 1) + ": " + text;
 }
 
-/// The same of the first that waits; empty if none does.
+/// The text of the first arm that waits; empty if none does.
 std::string waits_of(const Run& run, const LoopSignals& signals) {
   for (std::size_t arm = 0; arm < run.devices.size(); ++arm) {
     std::string text = waits_of(run, arm, signals.waiting[arm].load(std::memory_order_relaxed));

@@ -59,7 +59,7 @@ struct RunReport : ArmReport {
 /// All figures as JSON text; ends with a newline.
 [[nodiscard]] std::string report_json(const RunReport& report);
 
-/// The same figures for a person, on one screen.
+/// The figures for a person, on one screen.
 [[nodiscard]] std::string summary(const RunReport& report);
 
 }  // namespace kerf

@@ -35,7 +35,7 @@ struct CostReport {
   std::vector<ExplainedTick> ticks;
   std::vector<ArrayBytes> arrays;  ///< of the servo, then of the segment
   GainMargin gain;
-  std::string gain_lines;  ///< the same for a person
+  std::string gain_lines;  ///< `gain` as text for a person
 };
 
 /// The parts of a segment by its layout, each up to the begin of the next one.
@@ -47,10 +47,10 @@ struct CostReport {
 [[nodiscard]] CostReport explain(const LoadedScene& scene, CompiledScene& servo,
                                  const SegmentPlan& segment);
 
-/// For a person.
+/// The report for a person.
 [[nodiscard]] std::string explanation_text(const CostReport& explanation);
 
-/// The same figures as JSON; ends with a newline.
+/// The report as JSON; ends with a newline.
 [[nodiscard]] std::string explanation_json(const CostReport& explanation);
 
 /// The lines that the demo script passes to the emulator.

@@ -43,7 +43,7 @@ struct ContactResult {
   WorldVec<Real> centre_mm;
   Rotation<N> rotation = identity_rotation<N>();  ///< of its samples
   WorldVec<Unit> normal{};                        ///< out of the solid, of the head; 0 in air
-  WorldVec<Unit> press{};                         ///< the same of the whole tool
+  WorldVec<Unit> press{};                         ///< out of the solid, of the whole tool; 0 in air
   Unit head_fraction{1};                          ///< of the force along `press`
   DeviceVec<Real> head_lever_mm{};                ///< from its centre to the load of the head
   std::array<PlaneLoad<N>, kMaxPlanes> planes{};

@@ -37,7 +37,7 @@ inline void follow_silence(const SafetyTiming& timing, EncoderState& encoders) n
   encoders.rest_ticks = rests ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
 }
 
-/// The same of ticks that the host skipped.
+/// Counts ticks that the host skipped: they had no report.
 inline void miss_ticks(const SafetyTiming& timing, std::uint32_t ticks,
                        EncoderState& encoders) noexcept {
   const std::uint32_t counted = std::min(ticks, timing.hold_ticks + 1);

@@ -47,9 +47,9 @@ struct ServoOutput {
   bool refused = false;                   ///< no free position near the hand: no force
   bool shaft = false;                     ///< load of shaft and handpiece above 0.01 N
   bool held = false;                      ///< by a command: no force and no cut
-  bool undoing = false;                   ///< the last stroke is undone: likewise
+  bool undoing = false;                   ///< the last stroke is undone: no force and no cut
   bool undoable = false;                  ///< it can be
-  bool redoing = false;                   ///< a stroke that was undone is cut again: likewise
+  bool redoing = false;                   ///< a stroke is cut again: no force and no cut
   bool redoable = false;                  ///< it can be
   bool pedalled = false;                  ///< nothing is cut without button 1
   bool resetting = false;  ///< volumes go back to their first content: changes are no cuts
@@ -100,7 +100,7 @@ class AnyServo {
   /// One tick of all arms; both spans have one element for each arm.
   virtual void step(std::span<const DeviceReport> reports,
                     std::span<ServoOutput> outputs) noexcept = 0;
-  /// The same for a scene with one arm.
+  /// One tick of a scene with one arm.
   [[nodiscard]] ServoOutput step(const DeviceReport& report) noexcept {
     ServoOutput output;
     step(std::span(&report, 1), std::span(&output, 1));

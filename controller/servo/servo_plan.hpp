@@ -228,7 +228,7 @@ struct ToolInVolume {
 template <class N>
 struct ToolPlan {
   std::span<const ToolOffset> offsets;
-  SampleTable samples;  ///< the same for the methods `gather` and `splat` in fixed point
+  SampleTable samples;  ///< `offsets` for the methods `gather` and `splat` in fixed point
   /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
   bool turns = true;              ///< rotates with the stylus; else keeps the world's axes

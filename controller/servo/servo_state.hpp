@@ -42,8 +42,7 @@ template <class N>
 struct ContactState {
   using Volumes = std::array<ContactVolume<N>, kMaxVolumes>;  ///< by index of the plan's volumes
   Volumes volumes{};
-  std::array<Volumes, kMaxShaftParts>
-      shaft_volumes{};  ///< the same with the samples of shaft and handpiece
+  std::array<Volumes, kMaxShaftParts> shaft_volumes{};  ///< with the samples of shaft and handpiece
   ProxyState<N> proxy;
 };
 

@@ -29,7 +29,7 @@ struct SafetyInputs {
   bool fresh = false;
   bool parked = false;      ///< as the device reports it
   bool calibrated = false;  ///< parked at rest for `rest_ticks`
-  bool misplaced = false;   ///< the same, but at another pose than in its first calibration
+  bool misplaced = false;   ///< parked at rest, at another pose than in its first calibration
   bool homed = true;        ///< the encoder counts are valid
   bool finite = true;
   bool overspeed = false;

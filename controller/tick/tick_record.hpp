@@ -59,7 +59,7 @@ inline bool apply_commands(const TickCommands& commands, AnyServo& servo) noexce
 /// The report in a record, and what `record_of` was given as commands.
 [[nodiscard]] DeviceReport report_of(const TickRecord& record, DeviceReport::Kind kind) noexcept;
 [[nodiscard]] TickCommands commands_of(const TickRecord& record) noexcept;
-/// The same of a tick with the records of all arms.
+/// The commands of a tick, from the records of all arms.
 [[nodiscard]] TickCommands commands_of(std::span<const TickRecord> records) noexcept;
 
 /// Puts the boxes that changed into the record, and steps the chain of their hashes. `hash_of` a
@@ -103,7 +103,7 @@ void make_records(const AnyServo& servo, std::span<const DeviceReport> reports,
     records[arm].penetration_mm = static_cast<float>(servo.penetration_mm(arm));
   }
 }
-/// The same; the hashes are those of the servo's own densities.
+/// Makes the records; their hashes are those of the servo's own densities.
 void make_records(const AnyServo& servo, std::span<const DeviceReport> reports,
                   const TickCommands& commands, std::span<const ServoOutput> outputs,
                   std::uint64_t& chain, std::span<TickRecord> records) noexcept;

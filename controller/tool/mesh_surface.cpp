@@ -27,7 +27,7 @@ using vec3::operator+, vec3::operator-, vec3::operator*;
 
 // Between two samples a pitch apart an edge of angle t rises 1/2 tan(t / 2) pitches above both.
 // That may be 0.04 units, the depth of a wedged tool (SweepRules::kWedged) less the tolerance.
-// The same holds for a row of samples along a rim that bends.
+// That angle is a rim's for a row of samples, too, along a bent rim.
 const double kSharp = 2 * arctangent(2 * 0.04, 1);
 const double kCosRim = cosine(kSharp);
 const double kStraight = 2 * sine(kSharp / 2);  // sum of two unit vectors that part by it
@@ -388,7 +388,7 @@ int facing(const Point& normal) {
   return 2 * widest + (normal[static_cast<std::size_t>(widest)] < 0 ? 1 : 0);
 }
 
-/// The same for each side of the mesh alone, so that both faces of a thin one get their part.
+/// Begins sites on each side of the mesh alone, so that both faces of a thin one get their part.
 void begin_sites_by_side(std::span<Dot> dots, std::size_t count, std::vector<Site>& sites) {
   const std::size_t all = dots.size(), known = sites.size();
   auto rest = dots.begin();

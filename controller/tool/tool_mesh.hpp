@@ -68,7 +68,7 @@ inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTri
 [[nodiscard]] std::vector<LooseTriangle> parse_stl(std::string_view bytes,
                                                    const std::string& location);
 
-/// The same of a file of at most kMaxStlBytes, in a sandbox.
+/// Parses a file of at most kMaxStlBytes, in a sandbox.
 [[nodiscard]] std::vector<LooseTriangle> read_stl(const std::string& file,
                                                   int cpu_s = kReadCpuSeconds);
 

@@ -32,7 +32,7 @@ inline constexpr std::int32_t kGuardVoxels = 3;
 /// border.
 void fade_to_air(VolumeImage& image);
 
-/// The same volume on another spacing. Per axis: linear interpolation if the new voxels are
+/// Resamples a volume to another spacing. Per axis: linear interpolation if the new voxels are
 /// smaller, the mean over the extent of the new voxel if they are larger; labels take the nearest.
 ///
 /// The outer face of the first voxel stays in place; only new voxels that lie whole inside the old

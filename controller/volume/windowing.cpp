@@ -68,7 +68,7 @@ VolumeImage apply_window(const SourceVolume& source, Window window) {
     if constexpr (std::is_same_v<T, float>) {
       std::ranges::transform(values, image.density.begin(),
                              [&](float v) { return density(static_cast<double>(v)); });
-    } else {  // the same, each of the 65536 values once
+    } else {  // each of the 65536 values once
       std::vector<Density> of(std::size_t{1} << 16);
       for (std::size_t i = 0; i < of.size(); ++i) of[i] = density(static_cast<T>(i));
       std::ranges::transform(values, image.density.begin(),

@@ -78,8 +78,9 @@ struct RgbPicture {
 /// points into the picture. Load time; about a second.
 [[nodiscard]] RgbPicture import_preview(const SourceVolume& source, const ProposedVolume& proposed);
 
-/// The same of a volume with labels: each label has its own colour (shared/volume/material.hpp), in
-/// the slices darker at low density; voxels without a label are grey.
+/// Pictures a volume with labels, as four panels: each label has its own colour
+/// (shared/volume/material.hpp), in the slices darker at low density; voxels without a label are
+/// grey.
 [[nodiscard]] RgbPicture label_preview(const VolumeImage& image, Density iso);
 
 }  // namespace kerf

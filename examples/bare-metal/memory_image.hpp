@@ -18,7 +18,7 @@ namespace kerf::bare {
 enum class Room : std::uint8_t {
   table,    ///< constant: stays in flash
   state,    ///< changes: in RAM, its first value in flash
-  volume,   ///< the same, of the size of a volume: start-up copies it by a list of its own
+  volume,   ///< a state of the size of a volume: start-up copies it by a separate list
   scratch,  ///< changes, and is zero at first: takes no flash
   field,    ///< constant, of the size of a volume: in flash, beside the volumes' first contents
   first     ///< the first content of a block of the room `volume`, in flash

@@ -36,7 +36,7 @@ struct PlantParams {
   std::array<double, 3> torque_nmm_per_count{0.342, 0.342, 0.342};  ///< 0.70 N m at full scale
   double current_lag_s = 0;     ///< time constant of the current loop; 0 = none
   int output_delay_cycles = 0;  ///< 0..kMaxDelayCycles, from a command to its torque
-  int input_delay_cycles = 0;   ///< the same from the joints to their report
+  int input_delay_cycles = 0;   ///< 0..kMaxDelayCycles, from the joints to their report
   OnSilence on_silence = OnSilence::hold_torque;
   int silence_cycles = 800;  ///< 100 ms without a command count as silence
 

@@ -51,7 +51,7 @@ class WoodenArm {
   [[nodiscard]] static JointVec<double> renamed(JointVec<double> q) noexcept {
     return {-q.x, kQuarter - q.y, q.z};
   }
-  /// The same for torques and rates.
+  /// Changes the names of torques or rates, both ways.
   [[nodiscard]] static JointVec<double> turned(JointVec<double> v) noexcept {
     return {-v.x, -v.y, v.z};
   }

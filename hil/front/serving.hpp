@@ -56,7 +56,7 @@ inline constexpr std::int64_t kStopCheckNs = kStopCheckMs * std::int64_t{1'000'0
 /// Returns true if `fd` can be read within the time.
 [[nodiscard]] bool readable(int fd, int timeout_ms) noexcept;
 
-/// The same with a longer time: false if `patience_ns` are over or `stop` became true, seen within
+/// Waits until `fd` can be read: false if `patience_ns` are over or `stop` became true, seen within
 /// kStopCheckMs.
 [[nodiscard]] bool readable_within(int fd, std::int64_t patience_ns,
                                    const std::atomic<bool>& stop) noexcept;

@@ -33,7 +33,7 @@ void declare_bus(Arguments& app, BusOptions& options);
 /// Throws `HilError` for an impossible bus. `lockstep_hz`: servo rate in lock-step, 0 = real time.
 [[nodiscard]] FirewireSettings firewire_settings(const BusOptions& options, int lockstep_hz);
 
-/// The same for the other two devices' buses, which have no lock-step.
+/// Faults of the USB of Falcon and WoodenHaptics, which have no lock-step. Throws `HilError`.
 [[nodiscard]] std::vector<ScriptedUsbFault> usb_script(const BusOptions& options);
 
 /// Options of the front websocket: the emulated Inverse Service.
@@ -54,7 +54,7 @@ void declare_service(Arguments& app, ServiceOptions& options);
 /// The command line of kerf-emulator.
 struct EmulatorOptions {
   std::string device = "omni";  ///< a word of kPersonalityWords
-  Personality personality{};    ///< the same, once checked
+  Personality personality{};    ///< of `device`, once checked
   bool describe = false;
   std::string front = "socket";
   std::string socket;

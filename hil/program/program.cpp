@@ -233,7 +233,7 @@ void serve_usbip(BusService& service, const FtdiFalcon::Settings& falcon,
   service.stats.dropped = device.chip().lost();
 }
 
-/// `--front uhid`: the WoodenHaptics arm in this machine's HID stack. Throws `HilError` likewise.
+/// `--front uhid`: the WoodenHaptics arm in this machine's HID stack. Throws `HilError`.
 void serve_uhid(BusService& service, const WoodenHid::Settings& wooden) {
   UhidArm device(open_uhid(), wooden, service.device);
   service.out << "kerf-emulator: woodenhaptics at /dev/uhid" << std::endl;

@@ -104,7 +104,7 @@ struct FaultScript {
 /// throws `HilError` that names file and line. Start-up only.
 [[nodiscard]] FaultScript read_fault_script(const std::filesystem::path& file);
 
-/// The same from text; `location` names it in errors.
+/// Reads a fault script from text; `location` names it in errors.
 [[nodiscard]] FaultScript parse_fault_script(std::string_view text, const std::string& location);
 
 /// Three to six faults of any kind before `replay`, each of 20 to 320 ms (a late host: 1 to 100

@@ -15,7 +15,7 @@ namespace kerf {
 ///     start_mm = [0, 5, 0]       # first point above the surface
 ///     [device]                   # any key of kPlantKeys that belongs to it; options win
 ///     coulomb_n = 0.1
-///     [hand]                     # likewise
+///     [hand]                     # any key of kPlantKeys that belongs to it; options win
 ///     mass_kg = 0.1
 ///     [[step]]                   # exactly one of move_mm, hold, circle_mm, zigzag_mm
 ///     move_mm = [0, -1, 0]       # absolute, origin = surface point under the tool, y up
@@ -40,7 +40,7 @@ namespace kerf {
 /// and line. Start-up only.
 [[nodiscard]] HandScript read_hand_script(const std::filesystem::path& file);
 
-/// The same from text; `location` names it in errors.
+/// Reads a hand script from text; `location` names it in errors.
 [[nodiscard]] HandScript parse_hand_script(std::string_view text, const std::string& location);
 
 }  // namespace kerf

@@ -60,7 +60,7 @@ class Device {
   /// controller has ended; `state` keeps its last tick. It asks four times a period, for as long as
   /// the controller lives.
   bool wait() noexcept;
-  /// The same without waiting: takes the newest tick if `state` does not have it yet, and returns
+  /// Does not wait: takes the newest tick if `state` does not have it yet, and returns
   /// whether it did.
   bool poll() noexcept;
   /// False once `wait` or `poll` has found that the controller has ended.

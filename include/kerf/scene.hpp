@@ -59,13 +59,13 @@ class Scene {
   /// Throws Error.
   [[nodiscard]] static Scene load(const std::filesystem::path& file, const Settings& settings = {});
 
-  /// The same with a text; files that it names lie in `folder`. Throws Error.
+  /// The scene in a text; files that it names are in `folder`. Throws Error.
   [[nodiscard]] static Scene parse(std::string_view text, const std::filesystem::path& folder,
                                    const Settings& settings = {});
 
-  /// The same with these densities as the first [[volume]]. Its `file` is a name for messages; what
-  /// says how a file is read (`window`, `spacing_mm`, `override_spacing_mm`, a phantom) is refused.
-  /// Throws Error.
+  /// The scene in a text, with these densities as the first [[volume]]. Its `file` is a name for
+  /// messages; what says how a file is read (`window`, `spacing_mm`, `override_spacing_mm`, a
+  /// phantom) is refused. Throws Error.
   [[nodiscard]] static Scene of_voxels(const Voxels& first, std::string_view text,
                                        const Settings& settings = {});
 

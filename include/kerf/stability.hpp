@@ -158,7 +158,7 @@ struct WallRun {
 /// same value gives the same bits. Throws Error for a law or estimator that does not exist.
 [[nodiscard]] LimitCycle run_on_wall(const WallRun& run);
 
-/// The same, and `watch` gets each tick: how far out of the wall the tip is, and its speed
+/// Runs it, and calls `watch` in each tick: how far out of the wall the tip is, and its speed
 /// outwards. What it throws ends the run, and comes out as it is.
 using WallWatch = std::function<void(double tip_mm, double mm_per_s)>;
 [[nodiscard]] LimitCycle run_on_wall(const WallRun& run, const WallWatch& watch);
@@ -177,7 +177,8 @@ struct MapColumn {
   /// The lowest stiffness, within 0.5 %, at which a hit of any seed oscillates, or gives energy; 0:
   /// the lowest of all does; infinite: none does.
   double first_swing_n_per_mm = 0, first_energy_n_per_mm = 0;
-  /// The same of each seed alone; one, if the loop's encoders have no steps that it shifts.
+  /// Lowest stiffness of each seed alone; one entry, if the loop's encoders have no steps that it
+  /// shifts.
   std::vector<double> swing_by_seed_n_per_mm, energy_by_seed_n_per_mm;
 };
 

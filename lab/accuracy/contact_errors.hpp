@@ -42,7 +42,7 @@ struct ContactErrors {
   ErrorStats direction_deg;  ///< between the two, if theory has at least a tenth of full scale
   ErrorStats normal_deg;     ///< of one sample at the voxels on the face, against the true normal
   ErrorStats sample_loop;    ///< closed loops of one sample about a point on the face
-  ErrorStats tool_loop;      ///< the same of the whole tool, about the contact
+  ErrorStats tool_loop;      ///< closed loops of the whole tool about the contact
   ErrorStats step;           ///< |dF| per kStepMm along the face
 };
 

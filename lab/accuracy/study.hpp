@@ -49,7 +49,7 @@ struct Scope {
 /// All figures of a study as a table, one row for each: knob, value, shape, metric, figure, unit,
 /// and the tick's us p50, p99, max.
 [[nodiscard]] std::string csv(const std::vector<Entry>& entries);
-/// The same as JSON, with machine, compiler, day and core of the run (lab/report/accuracy.py).
+/// The figures as JSON, with machine, compiler, day and core of the run (lab/report/accuracy.py).
 [[nodiscard]] std::string json(const std::vector<Entry>& entries, int core);
 
 }  // namespace kerf::accuracy

@@ -41,8 +41,8 @@ struct OutputPaths {
   void declare(Arguments& app);
 };
 
-/// The same, checked before the map is measured: none is one of the parts, which are read. Throws
-/// HilError, or FileError.
+/// The output files, checked before the map is measured: none is one of the parts that are read.
+/// Throws HilError, or FileError.
 class Outputs {
  public:
   Outputs(const OutputPaths& paths, const std::vector<std::string>& parts);

@@ -145,7 +145,7 @@ void check_spec(const MapSpec& spec) {
   if (spec.seeds < 1 || spec.seeds > kMostSeeds) throw HilError("--seeds: not within 1 and 100");
 }
 
-/// The same map, whatever the shard and the program.
+/// Identifies the map of a part, without shard and program.
 std::string map_of(const Part& part) {
   return head_of({part.spec, {}, {}});
 }

@@ -21,7 +21,7 @@ inline constexpr double kStartMm = 0.1;
 /// back sooner). Never below 0.25 s.
 [[nodiscard]] double slowest_swing_s(const LoopCase& subject, double stiffness_n_per_mm);
 
-/// The same for a run of this limit, as ticks. `remembered_s` is how long an earlier motion of a
+/// Ticks of a run that watches for such a swing. `remembered_s` is how long an earlier motion of a
 /// tip that is held has an effect, beyond the delay and the velocity window.
 [[nodiscard]] LimitCycleDetector::Ticks hit_ticks(const LoopCase& subject,
                                                   double stiffness_n_per_mm, double limit_s,

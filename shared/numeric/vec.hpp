@@ -43,7 +43,7 @@ using VoxelVec = Vec<S, VoxelSpace>;
 template <class S>
 using JointVec = Vec<S, JointSpace>;
 
-/// The same three numbers in another space: only for transforms, with the reason beside it.
+/// Converts the space and keeps the numbers: only for transforms, with the reason beside it.
 template <class ToSpace, class S, class Space>
 [[nodiscard]] constexpr Vec<S, ToSpace> relabel(Vec<S, Space> v) noexcept {
   return {v.x, v.y, v.z};
@@ -176,7 +176,7 @@ template <class N>
   }
 }
 
-/// a - b, likewise.
+/// a - b, saturating in fixed.
 template <class N>
 [[nodiscard]] constexpr typename N::Energy difference_of_energy(typename N::Energy a,
                                                                 typename N::Energy b) noexcept {

@@ -64,7 +64,7 @@ class AtomicFile {
   void take_temporary_name();
   /// After `close`. The file that it replaces keeps the temporary name until the destructor.
   void commit();
-  /// The same if nothing is at `path` yet; else returns false and leaves `path` unchanged.
+  /// Commits if nothing is at `path` yet; else returns false and leaves `path` unchanged.
   [[nodiscard]] bool commit_if_new();
   /// After either: restores the old state. A file system that cannot swap two names keeps the new
   /// file if it replaced an old one.
@@ -128,7 +128,7 @@ class AtomicFiles {
 [[nodiscard]] std::string with_part(std::string_view page, std::string_view name,
                                     std::string_view text);
 
-/// The same with a file, which may be missing. Throws FileError.
+/// Writes the part into the page in `file`, which may be missing. Throws FileError.
 void write_page_part(const std::filesystem::path& file, std::string_view name,
                      std::string_view text);
 

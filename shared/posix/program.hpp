@@ -47,7 +47,7 @@ class AlreadySaid : public std::runtime_error {
 /// `name`, so that opening it fails with that name. Start-up only.
 [[nodiscard]] std::string find_data_file(const std::string& name);
 
-/// The same for a scene, of which a name is enough, as `touch`: those of kerf have a folder of
+/// Finds a scene, of which a name is enough, such as `touch`: those of kerf have a folder of
 /// their own and the ending .toml.
 [[nodiscard]] std::string find_scene_file(const std::string& name);
 

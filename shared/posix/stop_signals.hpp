@@ -25,7 +25,7 @@ namespace kerf {
 /// Main thread, once per process; stays for the rest of it.
 std::atomic<bool>& catch_stop_signals() noexcept;
 
-/// The same, and SIGTSTP, SIGTTIN and SIGTTOU ask for the end too: for a program that must not be
+/// Catches SIGTSTP, SIGTTIN and SIGTTOU, too, as requests to end: for a program that must not be
 /// paused.
 std::atomic<bool>& catch_stop_and_pause_signals() noexcept;
 

@@ -66,8 +66,8 @@ enum class Lifecycle : std::uint32_t { init = 0, run = 1, hold = 2, clean_end = 
 struct SegmentHeader {
   std::uint64_t magic;         ///< stored last (release), read first (acquire)
   std::uint32_t layout_major;  ///< `kLayoutMajor`; a reader refuses any other value
-  std::uint32_t layout_minor;  ///< `kLayoutMinor`; likewise
-  std::uint64_t abi_hash;      ///< `kAbiHash`, over the layout; likewise
+  std::uint32_t layout_minor;  ///< `kLayoutMinor`; a reader refuses any other value
+  std::uint64_t abi_hash;      ///< `kAbiHash`, over the layout; a reader refuses any other value
   std::uint64_t session_id;    ///< random, not 0; each start of the controller has a new one
   std::uint64_t total_bytes;   ///< size of the segment
   std::uint64_t config_hash;   ///< of the scene with all its settings

@@ -42,7 +42,7 @@ namespace kerf {
   return shown;
 }
 
-/// The same, cut after 400 bytes: for quotations from a file of the user.
+/// `escaped`, cut after 400 bytes: for quotations from a file of the user.
 [[nodiscard]] inline std::string one_line(std::string_view text) {
   constexpr std::size_t kLongestLine = 400;
   return escaped(text.substr(0, kLongestLine));

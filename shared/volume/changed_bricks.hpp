@@ -105,7 +105,7 @@ class ChangedBricks {
     for (const ChangedBrick& brick : bricks_) all = all.united(bounds(brick, bricks));
     return all;
   }
-  /// The same of one brick.
+  /// The changed voxels of one brick.
   [[nodiscard]] static VoxelBox bounds(const ChangedBrick& brick,
                                        const BrickGrid& bricks) noexcept {
     return bounds_of(brick.voxels).moved(bricks.voxels(brick.id).lo);

@@ -71,7 +71,7 @@ void with_handle(Handle handle, const Use& use) {
   with_handle(handle, 0, [&](Touch& device) { return use(device), 0; });
 }
 
-/// The same for the current device.
+/// Calls `use` with the current device.
 template <class Result, class Use>
 Result with_device(Result otherwise, const Use& use) {
   Library& lib = library();

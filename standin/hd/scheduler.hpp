@@ -71,7 +71,7 @@ class Scheduler {
   void serve(bool lockstep, int rate_hz);
   void run_callbacks();
   [[nodiscard]] bool contains(Ulong handle) const noexcept;  ///< with the lock
-  void erase(Ulong handle) noexcept;                         ///< likewise
+  void erase(Ulong handle) noexcept;                         ///< with the lock
   void wait(std::unique_lock<std::mutex>& lock, Ulong handle);
 
   Tick tick_;

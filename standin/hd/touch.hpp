@@ -68,7 +68,7 @@ class Touch {
 
   /// Nothing, and an error, if there is no such parameter or none in these types.
   [[nodiscard]] std::optional<Values> read(Enum name, unsigned type) noexcept;
-  /// Number of values that a write takes; 0, and an error, likewise.
+  /// Number of values that a write takes; 0, and an error, if there is no such parameter.
   [[nodiscard]] std::size_t writes(Enum name, unsigned type) noexcept;
   void write(Enum name, const std::array<double, 16>& value) noexcept;
   /// Null, and an error, for another parameter.
@@ -127,7 +127,7 @@ class Touch {
   bool force_output_ = false, clamps_ = true, ramps_ = true, checks_force_ = true,
        one_frame_ = true;
   double velocity_limit_ = 1200;  ///< mm/s, by one comment of a client
-  double impulse_limit_n_ = 4;    ///< N a tick, likewise
+  double impulse_limit_n_ = 4;    ///< N a tick, by one comment of a client
   double ramping_rate_ = 0;
 };
 

@@ -28,24 +28,26 @@ struct AirWall {
         body(blurred({kEdge, kEdge, kEdge}, [&](Point p) { return frame.of(p)[1]; })) {}
 };
 
-/// A tool that is led to and fro along it.
+/// A tool that moves to and fro along an AirWall, in the air.
 struct AirFlight {
-  double units_per_tick = 1;  ///< a long tick makes a path that leaves the volume
+  double units_per_tick = 1;  ///< large values: the path leaves the volume
   double gap_units = 1;       ///< from the wall's iso-surface
-  double turn_rad = 0;        ///< in each tick, about any axis; the gap is then the whole sphere's
+  double turn_rad = 0;        ///< rotation per tick about a random axis; if not 0, the gap is
+                              ///< that of the sphere around the tool
   double unit_mm = 0.1, period_s = 0.001;  ///< of the force alone
 };
 
-/// The largest contact there: none, if all is well.
+/// The largest values of a flight; in air spring and force should be 0.
 struct Flown {
   int ticks = 0;
   double longest_spring = 0;  ///< units
-  /// Of the coupling with 0.4 N/mm, without damping and with the most that a scene may have.
+  /// Force of a coupling with 0.4 N/mm: the larger one without damping and with the highest
+  /// damping that a scene may have.
   double force_n = 0;
   int most_queries = 0;
 };
 
-/// Adds what the coupling makes of a spring, from the hand to the proxy, and a motion of the hand.
+/// Adds the coupling's force for a `spring` from the hand to the proxy and a motion of the hand.
 template <class N>
 void add_air_force(const AirFlight& flight, Point spring, Point moved, Flown& flown) {
   const auto at_device = [](Point p, double scale) {

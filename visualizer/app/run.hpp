@@ -44,7 +44,8 @@ void begin_recording(const VisualizerOptions& options, PictureSize size, std::op
 [[nodiscard]] int run_headless(const VisualizerOptions& options);
 
 /// The window; follows restarted controllers too. Returns the `exit_code` when the user closes it
-/// or the time is over; the video of a window that changes its size is cut short. Throws as above.
+/// or the time is over; the video of a window that changes its size is cut short. Throws as
+/// run_headless does.
 [[nodiscard]] int run_window(const VisualizerOptions& options);
 
 /// Times every renderer on a volume of its own, without a controller: a table on stdout, all

@@ -28,7 +28,7 @@ namespace kerf {
 struct GradientRow {
   GradientFilter gradient;
   double angle_deg = 0.0;         ///< root mean square, on a ball
-  double noisy_angle_deg = 0.0;   ///< the same with noise in the density
+  double noisy_angle_deg = 0.0;   ///< `angle_deg` with noise in the density
   double p99_deg = 0.0;           ///< of 99 of 100 pixels of the ball
   double milled_angle_deg = 0.0;  ///< both in a hollow that a ball milled
   double milled_p99_deg = 0.0;

@@ -13,14 +13,15 @@
 
 namespace kerf {
 
-/// The density gradient at each voxel, for all that shades surfaces: on the processor, on
-/// the GPU, at the vertices of a mesh, and to find out what of a picture must be drawn again.
-/// Interpolated between voxels. Around the volume is a border one voxel wide, of air: voxel v is at
-/// v + 1. It has gradients, too: the face of a volume one voxel thick lies between its voxel, whose
-/// gradient is 0, and the border.
+/// The density gradient at each voxel. Ray caster, GPU renderers and meshes shade with it, and it
+/// shows which pixels must be redrawn. Readers interpolate between voxels.
+///
+/// A border of air, one voxel wide, surrounds the volume, so voxel v has index v + 1. The border
+/// has gradients because a surface may lie between it and the outermost voxel: in a volume one
+/// voxel thick the voxels' own gradients are 0.
 class GradientRows {
  public:
-  /// 32768 + 32767 g along each axis, g in -1..1; the last is nothing. GL's RGBA16.
+  /// 32768 + 32767 g along each axis, g in -1..1; the fourth number is unused. GL's RGBA16.
   using Entry = std::array<std::uint16_t, 4>;
   static constexpr Entry kNone{32768, 32768, 32768, 0};
 
@@ -30,14 +31,14 @@ class GradientRows {
   /// What a volume of this extent takes.
   [[nodiscard]] static std::size_t entry_count(const VoxelGrid& grid) noexcept;
 
-  /// Call after voxels have `changed` in `density`, which is all of the volume. Returns the voxels,
-  /// and what of the border, whose gradients may have.
+  /// Call after voxels have `changed` in `density`, the whole volume. Returns boxes with all
+  /// voxels, of the border too, whose gradients may have changed.
   std::vector<VoxelBox> update(const ChangedBricks& changed, std::span<const Density> density);
 
   [[nodiscard]] const GradientPlan& plan() const noexcept { return plan_; }
-  /// Of a voxel, or of the border.
+  /// The gradient at a voxel of the volume or of the border.
   [[nodiscard]] glm::vec3 at(const VoxelIndex& voxel) const noexcept;
-  /// As the kernels take it; good as long as this object.
+  /// For the kernels of the ray caster; valid as long as this object.
   [[nodiscard]] CastGradient view() const noexcept;
   [[nodiscard]] const Entry* data() const noexcept { return entries_.data(); }
 
@@ -47,7 +48,7 @@ class GradientRows {
     GradientWork filters;
   };
   void fill(const VoxelBox& box, std::span<const Density> density, Work& work);
-  /// In `entries_`, of a voxel or of the border.
+  /// Index in `entries_` of a voxel of the volume or of the border.
   [[nodiscard]] std::size_t place(const VoxelIndex& voxel) const noexcept;
 
   GradientPlan plan_;

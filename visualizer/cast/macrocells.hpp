@@ -17,8 +17,8 @@ namespace kerf {
 ///
 /// Air surrounds the volume: its surface is closed at the border too. Cell (i, j, k) spans voxel
 /// coordinates ei-1 to ei+e-1 on each axis with both ends, so its highest density bounds every
-/// trilinear sample in the cell; likewise its octants, of e/2 voxel edges. Those of cells of two
-/// are the cells of eight voxels in which a trilinear sample lies. A changed brick (voxels 8b to
+/// trilinear sample in the cell. Its octants have e/2 voxel edges; the octants of cells of two are
+/// the cells of eight voxels in which a trilinear sample lies. A changed brick (voxels 8b to
 /// 8b+7) touches cells 8b/e to 8(b+1)/e.
 class Macrocells {
  public:
@@ -43,7 +43,7 @@ class Macrocells {
   [[nodiscard]] std::vector<std::array<std::uint16_t, 4>> boundary_faces() const {
     return boundary_faces(grid_.box());
   }
-  /// The same of the active cells in a box within `grid()`.
+  /// The faces around the active cells in a box within `grid()`.
   [[nodiscard]] std::vector<std::array<std::uint16_t, 4>> boundary_faces(
       const VoxelBox& cells) const;
 

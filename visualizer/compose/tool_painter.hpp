@@ -105,7 +105,7 @@ struct Hand {
   std::uint32_t tool = 0;                      ///< none if the scene has fewer
   glm::dvec3 force_n{0.0};
   friend bool operator==(const Hand&, const Hand&) noexcept = default;
-  /// The same tool in the same pose, whatever its force.
+  /// Whether tool and pose are equal; forces may differ.
   [[nodiscard]] bool rests_at(const Hand& other) const noexcept {
     return tip_mm == other.tip_mm && orientation == other.orientation && tool == other.tool;
   }

@@ -39,7 +39,7 @@ inline constexpr std::array kAskedVersions{GlVersion{4, 5}, GlVersion{3, 3}};
 /// empty: none, or it is 4.5 or newer.
 [[nodiscard]] std::string missing_extensions();
 
-/// The current context's version and driver, for a message; `missing` as above.
+/// The current context's version and driver, for a message; `missing`: missing_extensions().
 [[nodiscard]] std::string found_gl(const std::string& missing);
 /// Message where nothing but `found` is to be had; it begins with `location`.
 [[nodiscard]] std::string gl_is_too_old(const std::string& location, const std::string& found);

@@ -36,7 +36,7 @@ class RenderTarget {
   void for_parts(const Draw& draw) const {
     for_parts(parts_, draw);
   }
-  /// The same for `parts` within the target's own.
+  /// Calls `draw` for each of `parts`, which lie within the target's own.
   template <class Draw>
   void for_parts(std::span<const PixelRect> parts, const Draw& draw) const {
     for (const PixelRect& part : parts) {
@@ -58,7 +58,7 @@ class RenderTarget {
   void enlarge(const RenderTarget& from, std::span<const PixelRect> parts) const;
   /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
-  /// The same of a target of floats, as they are.
+  /// The numbers of a target of floats, unchanged; first row at the top.
   [[nodiscard]] std::vector<float> read_floats() const;
   /// Window depth 0..1, first row at the top.
   [[nodiscard]] std::vector<float> read_depth() const;

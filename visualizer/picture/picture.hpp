@@ -83,7 +83,7 @@ class Picture {
   [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
 
  private:
-  /// The same of other settings.
+  /// The scene's view with other settings.
   [[nodiscard]] SceneView scene_in(const ViewSettings& settings) const;
   [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session,
                                                           const ViewSettings& settings);

@@ -92,7 +92,7 @@ class Renderer {
 /// Throws VisualizerError for a choice that no scene can have.
 void check_renderers(const std::string& choice);
 
-/// The same by volume; throws for another number of volumes too.
+/// The renderer of each volume; throws also for another number of volumes.
 [[nodiscard]] std::vector<std::string> renderer_of_each(const std::string& choice,
                                                         std::size_t volumes);
 
@@ -103,7 +103,7 @@ void check_renderers(const std::string& choice);
 
 /// `choice` with the renderer after that of the first volume for all.
 [[nodiscard]] std::string next_renderer(const std::string& choice);
-/// The same for one of `volumes` volumes.
+/// `choice` with the next renderer for one of `volumes` volumes.
 [[nodiscard]] std::string next_renderer(const std::string& choice, std::size_t volumes,
                                         std::size_t volume);
 

@@ -64,7 +64,7 @@ class SlicesRenderer final : public Renderer {
  public:
   struct Options {
     float step_vox = 1.0F;         ///< between slices, in the shortest voxel edge of all volumes
-    float moving_step_vox = 3.0F;  ///< the same while camera or objects move
+    float moving_step_vox = 3.0F;  ///< between slices while camera or objects move
   };
 
   SlicesRenderer(const SceneView& scene, std::span<const VolumeContent> contents)

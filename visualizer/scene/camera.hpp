@@ -61,13 +61,13 @@ class OrbitCamera {
 
   /// Drags of the pointer, in fractions of the picture's height.
   void orbit(double right, double up);
-  /// The same about a point in world mm, which stays where it is in the picture.
+  /// Orbits about a point in world mm, which keeps its position in the picture.
   void orbit_about(const glm::dvec3& pivot_mm, double right, double up);
   void pan(double right, double up);
   /// Steps of the wheel: positive is nearer, down to 1/50 and up to 20 times the radius of what is
   /// framed. A pose may lie beyond: from there no farther.
   void zoom(double steps);
-  /// The same about a point in world mm, which stays where it is in the picture.
+  /// Zooms about a point in world mm, which keeps its position in the picture.
   void zoom_about(const glm::dvec3& pivot_mm, double steps);
 
   /// The near and far planes hold all that is within `reach_mm` of the centre of what is framed:

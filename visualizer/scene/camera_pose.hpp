@@ -32,7 +32,7 @@ struct CameraPose {
 /// Nine numbers with commas between: EYE,TARGET,UP. Throws VisualizerError.
 [[nodiscard]] CameraPose parse_camera_numbers(std::string_view text);
 
-/// The same as a file of TOML:
+/// Reads a camera from a file of TOML:
 ///
 ///     [camera]
 ///     eye_mm = [12.5, 40, 33]
@@ -44,7 +44,7 @@ struct CameraPose {
 
 /// Whether a value of --camera names a file: it has no comma, or it ends in .toml.
 [[nodiscard]] bool is_camera_file(std::string_view given);
-/// What --camera gives: numbers, or the name of a file. Throws as above.
+/// What --camera gives: numbers, or the name of a file. Throws VisualizerError.
 [[nodiscard]] CameraPose read_camera(const std::string& given);
 
 /// Writes such a file, whole or not at all, to a millionth of a mm. Throws FileError.

@@ -19,9 +19,9 @@ namespace kerf {
 
 /// How the gradient of the density is estimated, which is the normal of what is shaded.
 enum class GradientFilter : std::uint8_t {
-  central,   ///< the difference over two voxel edges along each axis: sharp and rough
-  corners,   ///< the same, of means over two voxel edges along the others: calms steps of a cut
-  farid5,    ///< from 5x5x5 voxels, as the servo does: blurs over four edges
+  central,  ///< the difference over two voxel edges along each axis: sharp and rough
+  corners,  ///< central, of means over two voxel edges along the other axes: smooths steps of a cut
+  farid5,   ///< from 5x5x5 voxels, as the servo does: blurs over four edges
   adaptive,  ///< from 15x15x15 voxels where that and farid5 agree, else farid5; unequal voxels:
              ///< from as many mm along each axis
 };
@@ -102,7 +102,7 @@ void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
                     std::span<const Density> density, const VoxelBox& box,
                     std::vector<glm::vec3>& gradients, GradientWork& work);
 
-/// The same, once.
+/// Fills gradients with temporary memory.
 inline void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
                            std::span<const Density> density, const VoxelBox& box,
                            std::vector<glm::vec3>& gradients) {

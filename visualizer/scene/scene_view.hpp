@@ -59,8 +59,8 @@ struct ToolView {
   std::string name;
   std::vector<std::array<double, 2>> profile_mm;  ///< (y, radius), from the tip upwards
   double radius_mm = 0.0;                         ///< of the cutting head, at its widest
-  /// The same of shaft and handpiece if the servo loads them; empty if not: the picture makes one
-  /// up.
+  /// Profile of shaft and handpiece if the servo loads them; if empty, the picture has a default
+  /// one.
   std::vector<std::array<double, 2>> shaft_mm{};
   Facets facets{};  ///< instead of a profile
 };

@@ -20,8 +20,8 @@ inline constexpr std::int32_t kFreeFarthest = 254;  ///< the longest distance, s
 /// A sample bears a load only if a voxel at most so far from it along each axis reaches the
 /// iso: the reach of a closeup, and its cell (docs/theory.md 3.2).
 inline constexpr std::int32_t kIsoNear = 3;
-/// The same as distance from the position that reads this voxel, steps of the map:
-/// (kIsoNear - 1) sqrt 3.
+/// Farthest distance of such a voxel from the sample's own voxel, in steps of the map: sqrt 3
+/// times (kIsoNear - 1).
 inline constexpr std::int32_t kIsoNearSteps = 14;
 static_assert(kIsoNearSteps * kIsoNearSteps >=
               3 * (kIsoNear - 1) * (kIsoNear - 1) * kFreeSteps * kFreeSteps);
@@ -97,9 +97,9 @@ inline constexpr std::int32_t kMaxShellPoints = 8192;  ///< sums then fit 53 bit
 template <class N>
 struct PointTable {
   const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
-  const PointNumber<N>* middle[3] = {};  ///< of each group, the same
+  const PointNumber<N>* middle[3] = {};  ///< of each group, from the centre, over the reach; Q0.15
   const std::uint8_t* needed = nullptr;  ///< `free_steps_for` each group
-  /// The same for all of the tool about its centre, and for one sample.
+  /// `free_steps_for` the whole tool about its centre, and for one sample.
   std::uint8_t needed_whole = kFreeFarthest + 1, needed_sample = kFreeFarthest + 1;
   std::int32_t count = 0;  ///< of samples
   std::int32_t groups = 0;

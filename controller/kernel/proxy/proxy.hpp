@@ -35,7 +35,7 @@ class StartSearch {
   StartSearch() = default;
   /// Searches around the position of a former tool.
   explicit constexpr StartSearch(Position around) noexcept : around_(around), replaces_(true) {}
-  /// The same search from its start, for another tool.
+  /// A new search from the same start, for another tool.
   [[nodiscard]] constexpr StartSearch again() const noexcept {
     return replaces_ ? StartSearch(around_) : StartSearch();
   }

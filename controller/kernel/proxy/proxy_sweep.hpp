@@ -38,8 +38,8 @@ struct SweepRules {
   /// No rotation begins after this many queries, pushes included; the rest is kept for the move.
   static constexpr std::int32_t kMaxRotationQueries = 12;
   static constexpr double kTolerance = 0.01;  ///< a position this deep is allowed
-  /// The same for a rotation. It leaves the move some play; otherwise an inverted cone with a shaft
-  /// stops between plates (rows `traps`, --seed 15590).
+  /// Allowed depth after a rotation. It leaves the move some play; otherwise an inverted cone with
+  /// a shaft stops between plates (rows `traps`, --seed 15590).
   static constexpr double kTurnTolerance = 0.005;
   static constexpr double kArrived = 0.004;  ///< shorter displacements are not tried
   /// A smaller load of all planes together bears nothing: the tool is at its goal then.

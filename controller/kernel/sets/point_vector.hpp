@@ -56,7 +56,7 @@ inline constexpr PointSums<FixedNumbers> kFullSample = [] {
 [[gnu::always_inline]] inline V blend16(V a, V b, V t) noexcept {
   return Simd::add16(a, Simd::multiply_round(Simd::sub16(b, a), t));
 }
-/// The same along x, of the two halves of each 32 bits: near (1 - t) + far t. The weights are
+/// Blend along x of the two halves of each 32 bits: near (1 - t) + far t. The weights are
 /// negative: t - 2^15 and -t fit 16 bits, 2^15 would not.
 [[gnu::always_inline]] inline V blend_halves(V pair, V weights) noexcept {
   return Simd::sra32<15>(Simd::sub32(Simd::set32(1 << 14), Simd::multiply_pairs(pair, weights)));

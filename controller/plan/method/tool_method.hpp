@@ -50,8 +50,8 @@ struct UnitCosts {
 [[nodiscard]] StageCost priced(const char* stage, std::uint64_t operations, const UnitCosts& prices,
                                std::string_view runs_it);
 
-/// The queries of the swept proxy: samples that are read, and work that counts like them. They cost
-/// the same beside every method. The price is that of the costliest ticks that `kerf studies
+/// The queries of the swept proxy: samples that are read, and work that counts like them. Their
+/// cost does not depend on the method. The price is that of the costliest ticks that `kerf studies
 /// extremes` finds, of tools of 500 to 1100 samples, and of queries inside of the solid.
 [[nodiscard]] StageCost query_stage(std::uint64_t samples, std::string_view runs_it);
 

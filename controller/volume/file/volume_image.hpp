@@ -45,8 +45,8 @@ inline constexpr std::int64_t kMaxVoxels = std::int64_t{512} << 20;
 void check_grid(const std::string& location, std::int64_t nx, std::int64_t ny, std::int64_t nz,
                 const char* way_out = "crop or resample it first");
 
-/// Throws LoadError unless each spacing is finite and within 1 nm .. 1 m. `location` and `way_out`
-/// as above.
+/// Throws LoadError unless each spacing is finite and within 1 nm .. 1 m. `location` begins
+/// the message; `way_out` ends it.
 void check_spacing(const std::string& location, const std::array<double, 3>& spacing_mm,
                    const char* way_out = "`spacing_mm = [..]` in the scene or `--spacing`");
 

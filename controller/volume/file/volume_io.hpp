@@ -75,7 +75,7 @@ enum class VolumeEncoding : std::uint8_t { gzip, raw };
 void write_volume(const VolumeImage& image, const std::filesystem::path& path,
                   VolumeEncoding encoding = VolumeEncoding::gzip);
 
-/// The same as a part of `files`, which are not committed yet.
+/// Adds the volume's file to `files`, which writes all of them at once when it is committed.
 void add_volume(const VolumeImage& image, const std::filesystem::path& path,
                 VolumeEncoding encoding, AtomicFiles& files);
 

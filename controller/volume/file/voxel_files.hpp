@@ -22,10 +22,11 @@ enum class Packing : std::uint8_t { raw, text, hex, deflated, bzip2 };
 /// A file with a part of the voxels.
 struct VoxelPart {
   std::filesystem::path file;
-  std::uint64_t begin = 0;  ///< offset: the end of a header in the same file
-  std::uint64_t lines = 0;  ///< to skip from there
-  std::int64_t bytes = 0;   ///< to skip after them, unpacked; -1 - n: the voxels end n bytes
-                            ///< before the file does
+  // The voxels begin after these three, in this order:
+  std::uint64_t begin = 0;  ///< bytes of a header in this file
+  std::uint64_t lines = 0;  ///< lines to skip
+  std::int64_t bytes = 0;   ///< bytes to skip, unpacked; -1 - n: the voxels are the last ones of
+                            ///< the file but for n bytes
 };
 
 struct VoxelFiles {
@@ -52,10 +53,12 @@ struct FileNames {
   [[nodiscard]] std::string name(std::int64_t number) const;
 };
 
-/// The names, beside the header, of a pattern with the first number, the last, the step and, if it
-/// is there, the number of axes in one file; or those that follow `LIST`. One file holds all axes
-/// but the last if that number is missing; all of them: equally many last layers. Refuses the field
-/// `key` if the number of names does not fit.
+/// Paths of the data files, in the header's folder.
+///
+/// Of a pattern, `names.numbers` has first number, last number, step and, optional, the axes per
+/// file; of `LIST`, the names are in `list` and `names.numbers` has at most the axes per file. By
+/// default one file has all axes but the last. If a file has all axes, each has an equal number of
+/// layers of the last one. Refuses the field `key` if the number of names does not match `sizes`.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const HeaderFields& fields,
                                                           const char* key, const FileNames& names,
                                                           const std::vector<std::string>& list,

@@ -38,7 +38,7 @@ class IsoResources {
     bandwidth_ += bandwidth;
   }
 
-  /// The same as every node of the bus sees it: four registers (IEEE 1394-1995, 8.3.2.3).
+  /// The resources as every node of the bus sees them: four registers (IEEE 1394-1995, 8.3.2.3).
   enum class Register : std::uint8_t { bus_manager, bandwidth, channels_low, channels_high };
 
   [[nodiscard]] std::uint32_t get(Register which) const noexcept {

@@ -124,7 +124,8 @@ class FirewireBus {
   [[nodiscard]] const FirewireStats& stats() const noexcept { return stats_; }
   /// The next cycle in which something is due that a client may wait for.
   [[nodiscard]] std::int64_t next_due() const noexcept { return schedule_.next(); }
-  /// The same with interrupts and the script; `EventSchedule::kNever` if none.
+  /// The next cycle in which anything is due, with interrupts and the script; else
+  /// `EventSchedule::kNever`.
   [[nodiscard]] std::int64_t next_event() const noexcept;
 
  private:

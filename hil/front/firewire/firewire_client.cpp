@@ -260,7 +260,7 @@ void FirewireClient::respond(std::uint64_t closure, std::uint32_t rcode,
   }
 }
 
-// ---- channels and bandwidth: likewise ----
+// ---- channels and bandwidth ----
 
 int FirewireClient::allocate() {
   auto request = argument<fw_cdev_allocate_iso_resource>();

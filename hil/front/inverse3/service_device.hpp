@@ -28,10 +28,10 @@ inline constexpr std::array<std::string_view, 4> kServiceProfileWords{"3.4", "3.
 /// what a real service does with the force of a client that is gone is not known.
 enum class ServiceFault : std::uint8_t {
   malformed,      ///< the next reply cannot be read: each time in another way of kMalformedWays
-  unreadable,     ///< no reply can be read from now on, likewise
+  unreadable,     ///< no reply can be read from now on, in the ways of kMalformedWays
   readable,       ///< they can again
   close,          ///< the service sends a closing frame (1000), and reads until the client's
-  going_away,     ///< the same with 1001
+  going_away,     ///< it sends a closing frame (1001), and reads until the client's
   half_close,     ///< it ends its side of the link (FIN), and reads until the client's end
   fin,            ///< it ends both sides: nothing can be carried any more
   reset,          ///< the connection is reset

@@ -53,7 +53,7 @@ struct Simd {
     std::memcpy(&value, static_cast<const char*>(p) + std::ptrdiff_t{at} * kEntryBytes, 4);
     return value;
   }
-  /// The same and the four bytes after them.
+  /// Loads two times four bytes, one after the other.
   template <int kEntryBytes>
   static void gather_two(const void* p, I at, I& first, I& second) noexcept {
     const char* const from = static_cast<const char*>(p) + std::ptrdiff_t{at} * kEntryBytes;

@@ -135,7 +135,7 @@ inline void clip_to(float size, F origin, F& direction, F& inverse, F& begin_mm,
   end_mm = Simd::min(end_mm, Simd::max(a, b));
 }
 
-/// The same along all axes.
+/// Clips the rays to the volume along all axes.
 inline void clip_to(const float (&size)[3], VolumeRays& rays) {
   clip_to(size[0], rays.origin.x, rays.direction.x, rays.inverse.x, rays.begin_mm, rays.end_mm);
   clip_to(size[1], rays.origin.y, rays.direction.y, rays.inverse.y, rays.begin_mm, rays.end_mm);
