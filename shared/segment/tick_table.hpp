@@ -152,7 +152,8 @@ inline constexpr TickField kTickFields[] = {
      "sent to the device, after all limits; at the device port",
      "0 while the motors are off"},
     {KERF_FIELD(TickRecord, contact_force_n, 128, "f32", 3), "N", {TickStage::contact, 7},
-     "part of the wanted force that the contact makes, before limits",
+     "part of the wanted force that the contact makes, before limits; in an external scene "
+     "the program's force after fading, before limits",
      kValidContact},
     {KERF_FIELD(TickRecord, modification_force_n, 140, "f32", 3), "N", {TickStage::force, 1},
      "part of it that cutting makes: reaction, or friction",

@@ -84,7 +84,7 @@ TEST_CASE("no program breaks a limit of any device, also if the device has fault
     const auto scene = kerf::Scene::load(kScenes + "/external.toml",
                                          {std::string("device.personality=\"") + device + "\"",
                                           "limits.slew_n_per_ms=0.5", "force.unchecked_gain=true"});
-    double felt_n = 0;
+    double rendered_n = 0;
     for (int seed = 0; seed < kSeeds; ++seed) {
       CAPTURE(seed);
       const std::string& fault = faults[static_cast<std::size_t>(seed) % faults.size()];
@@ -112,10 +112,10 @@ TEST_CASE("no program breaks a limit of any device, also if the device has fault
         const bool within = std::isfinite(now_n) && now_n <= kPeakN;
         const bool smooth = !on || length(change) <= std::max(kSlewN, before_n) + kRoundingN;
         broken += off_is_off && fault_is_off && within && smooth ? 0 : 1;
-        felt_n = std::max(felt_n, now_n);
+        rendered_n = std::max(felt_n, now_n);
       }
       CHECK(broken == 0);
     }
-    CHECK(felt_n > 1);
+    CHECK(rendered_n > 1);
   }
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A program of C, of which kerf has a header alone, gives the force of a controller with an emulated device: it is felt, held
+"""A program of C, of which kerf has a header alone, gives the force of a controller with an emulated device: it is rendered, held
 and faded as docs/external.md says, whatever becomes of the program, and the log replays to the bit.
 
     external_run_test.py ROOT BIN CC"""
@@ -48,7 +48,7 @@ int main(int count, char** words) {
     }
     --turns;
     kerf_external_give(&device, 0, &force);
-    if (now.force_n[1] > 0.49 && now.answers > 1) puts("felt"), fflush(stdout);
+    if (now.force_n[1] > 0.49 && now.answers > 1) puts("rendered"), fflush(stdout);
     if (wait_us > 0) usleep(wait_us);
   }
   printf("refused %llu\n", (unsigned long long)now.refused);
@@ -104,11 +104,11 @@ class TestExternal(unittest.TestCase):
             time.sleep(0.01)
         return program
 
-    def until_felt(self, program):
+    def until_rendered(self, program):
         for line in program.stdout:
-            if line == "felt\n":
+            if line == "rendered\n":
                 return
-        self.fail("the force was never felt")
+        self.fail("the force was never rendered")
 
     def recorded(self, *words):
         recorder = self.start(BIN / "kerf-recorder", "--name", "external-run", "--out", self.folder / "log", *words)
@@ -130,13 +130,13 @@ class TestExternal(unittest.TestCase):
         self.assertEqual(program.returncode, expected, out)
         return out
 
-    def test_a_force_is_felt_and_fades_when_the_program_is_killed_and_the_log_replays(self):
+    def test_a_force_is_rendered_and_fades_when_the_program_is_killed_and_the_log_replays(self):
         for device in ("omni", "omega"):
             with self.subTest(device=device):
                 controller, recorder = self.controller(device=device), self.recorded()
                 for _ in range(2):  # killed, and the next one goes on
                     program = self.start(self.push)
-                    self.until_felt(program)
+                    self.until_rendered(program)
                     program.kill()
                     program.wait()
                     waits = self.start(self.push, "0", "0")
@@ -157,7 +157,7 @@ class TestExternal(unittest.TestCase):
     def test_a_flight_recording_lacks_the_forces_before_it_and_its_replay_is_refused(self):
         controller, recorder = self.controller(), self.recorded("--flight", "1")
         program = self.start(self.push)
-        self.until_felt(program)
+        self.until_rendered(program)
         while not self.catches(recorder, signal.SIGUSR1):
             self.assertIsNone(recorder.poll())
             time.sleep(0.01)
@@ -174,18 +174,18 @@ class TestExternal(unittest.TestCase):
         self.assertEqual((replay.returncode, replay.stdout), (2, ""), replay.stderr)
         self.assertRegex(replay.stderr, r"of the first \d+ ticks the force of the program is not in it; record the run whole")
 
-    def test_what_is_no_force_is_refused_and_counted_and_nothing_is_felt(self):
+    def test_what_is_no_force_is_refused_and_counted_and_nothing_is_rendered(self):
         controller = self.controller()
         program = self.start(self.push, "nan", "20000", "0")
         out = program.communicate(timeout=60)[0]
-        self.assertNotIn("felt", out)
+        self.assertNotIn("rendered", out)
         out = self.ended(controller)
         self.assertRegex(out, r"warning: (\d+) of \1 forces of the program were refused")
 
     def test_two_programs_and_none(self):
         controller = self.controller()
         first = self.start(self.push)
-        self.until_felt(first)
+        self.until_rendered(first)
         self.assertIn("a program has it", self.start(self.push).communicate(timeout=60)[0])
         controller.kill()
         out = first.communicate(timeout=60)[0]

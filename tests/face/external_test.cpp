@@ -71,7 +71,7 @@ TEST_CASE("a program's force fades in, holds, fades out without a new one and in
   }
 }
 
-TEST_CASE("a program that is late by less than force.stale_ms is not felt") {
+TEST_CASE("a program that is late by less than force.stale_ms has no effect") {
   Loop loop(external({"force.stale_ms=100"}));
   loop.pushed(kUp, 100);
   for (int i = 0; i < 20; ++i) {
