@@ -30,7 +30,7 @@ class Demo:
         self.root = os.path.dirname(kerf)
         self.scene = self.find_scene(options.scene or "phantom")
         self.out = self.processes = None
-        self.controller = self.emulator = self.second = self.arm = self.recorder = self.window = self.pictures = self.bridge = None
+        self.controller = self.emulator = self.second = self.kerf_arm = self.recorder = self.window = self.pictures = self.bridge = None
         self.code_of_signal = None
         self.finishing = False  # the results are being kept: a signal is too late
 
@@ -265,11 +265,11 @@ class Demo:
         """The adapter to the vendor's service, or to its library. kerf's stand-in for that finds the emulator by KERF_STAND_IN."""
         common = ["--device", self.options.device, "--name", self.name, "--report", os.path.join(self.results, "arm.json")]
         if self.options.device not in demo_options.STAND_INS:
-            self.arm = self.processes.start("arm", [*common, "--service", self.service()], out="arm.log", log="arm.log")
+            self.kerf_arm = self.processes.start("arm", [*common, "--service", self.service()], out="arm.log", log="arm.log")
             return
         settings = f"socket:{self.meet},device={self.options.device},hand=pushed,priority=81"  # as the emulator
         os.environ["KERF_STAND_IN"] = settings
-        self.arm = self.processes.start("arm", [*common, "--library", os.path.abspath(self.options.library)], out="arm.log", log="arm.log")
+        self.kerf_arm = self.processes.start("arm", [*common, "--library", os.path.abspath(self.options.library)], out="arm.log", log="arm.log")
 
     def is_met(self):
         if isinstance(self.meet, str):
@@ -370,16 +370,16 @@ class Demo:
             return failed
         # It has reported why it could not begin, and the others only wait for it.
         if code == 2 and self.code_of_signal is None and not self.has_log():
-            if self.arm is not None and self.arm.poll() is not None:
-                processes.conclude("arm", self.arm, 0)
+            if self.kerf_arm is not None and self.kerf_arm.poll() is not None:
+                processes.conclude("arm", self.kerf_arm, 0)
             if self.emulator is not None and self.emulator.poll() is not None:
                 processes.conclude("emulator", self.emulator, 0)
             return 2
         self.print_summary()
         terminate(self.window)
-        terminate(self.arm)  # before its emulator ends, which would be a lost device to it
+        terminate(self.kerf_arm)  # before its emulator ends, which would be a lost device to it
         for name, process, seconds in (("window", self.window, 10), ("recorder", self.recorder, 10),
-                                       ("visualizer", self.pictures, 60), ("arm", self.arm, 5), ("emulator", self.emulator, 5),
+                                       ("visualizer", self.pictures, 60), ("arm", self.kerf_arm, 5), ("emulator", self.emulator, 5),
                                        ("emulator-2", self.second, 5)):
             if process is not None:
                 worst = processes.conclude(name, process, seconds)

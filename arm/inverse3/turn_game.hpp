@@ -47,8 +47,6 @@ class TurnGame {
   [[nodiscard]] std::string_view next(const CartesianCommand& command, std::int64_t came_ns,
                                       std::int64_t clock_ns, std::int64_t now_ns,
                                       MessageBuffer& buffer) noexcept;
-  /// The next message has no force.
-  void take_back() noexcept { takes_back_ = true; }
 
   enum class Wait : std::uint8_t { goes_on, late, stalled, lost };
   /// The reply is not there yet. `late` and `stalled` once a turn: it takes longer than kLateNs, or

@@ -71,7 +71,7 @@ struct Request {
   int patience_ms = 0;
   const std::atomic<bool>& stop;
   IoThread io;
-  bool starts_arm = false;
+  bool starts_kerf_arm = false;
 };
 
 /// The text after the name of a bus; empty for another port.
@@ -124,7 +124,7 @@ std::unique_ptr<PacketPort> arm(std::string_view rest, const Request* request) {
                              std::string(word_of(request->ours.personality)) +
                              "; take --device inverse3, touch or omega");
   }
-  const bool starts = name.empty() && request->starts_arm;
+  const bool starts = name.empty() && request->starts_kerf_arm;
   if (name.empty()) name = word_of(request->ours.personality);
   return std::make_unique<ArmPort>(name, request->ours, request->patience_ms, request->stop,
                                    starts);
@@ -182,8 +182,8 @@ std::string resolve_port(const std::string& text, Personality personality) {
 
 std::unique_ptr<PacketPort> open_port(const std::string& text, const LinkHello& ours,
                                       int patience_ms, const std::atomic<bool>& stop, IoThread io,
-                                      bool starts_arm) {
-  const Request request{ours, patience_ms, stop, io, starts_arm};
+                                      bool starts_kerf_arm) {
+  const Request request{ours, patience_ms, stop, io, starts_kerf_arm};
   return port(text, &request);
 }
 

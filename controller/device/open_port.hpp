@@ -41,12 +41,12 @@ void check_port(const std::string& text);
 /// another device.
 [[nodiscard]] std::string resolve_port(const std::string& text, Personality personality);
 
-/// Opens a resolved port; `io` is for ports with threads of their own. `starts_arm`: for `arm`
+/// Opens a resolved port; `io` is for ports with threads of their own. `starts_kerf_arm`: for `arm`
 /// without a name starts kerf-arm if none runs. Retries for `patience_ms`
 /// while no device is connected, or until `stop`; the handshake with an emulator may take as long
 /// again.
 [[nodiscard]] std::unique_ptr<PacketPort> open_port(const std::string& text, const LinkHello& ours,
                                                     int patience_ms, const std::atomic<bool>& stop,
-                                                    IoThread io = {}, bool starts_arm = false);
+                                                    IoThread io = {}, bool starts_kerf_arm = false);
 
 }  // namespace kerf

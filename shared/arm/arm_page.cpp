@@ -310,7 +310,7 @@ std::unique_ptr<ArmPageController> ArmPageController::open(const std::string& na
   if (page->over()) return nullptr;
   if (!take_lock(page->file_.get(), kControllerByte)) {
     throw ArmPageError("the kerf-arm named " + name +
-                       " serves another controller; stop that one, or name another arm");
+                       " serves another controller; stop that one, or name another");
   }
   // What a killed controller has left, be it half a command, must not outlive it.
   const CommandRecord none;

@@ -36,10 +36,9 @@
 /// The adapter writes reports, the controller commands; the controller waits for nothing, and no
 /// access is a system call, but one: a command wakes an adapter that sleeps until there is one, as
 /// that of a device which takes turns with its host (FUTEX_WAKE, which never blocks). Reports are a
-/// ring, so that a controller slower than the arm loses none of them. The
-/// commands have one place for each of the threads and signal handlers that may send at once: one
-/// that was interrupted in the middle of its place does not stop the others, and the highest ticket
-/// counts.
+/// ring, so that a controller slower than kerf-arm loses none of them. Each of the threads and
+/// signal handlers that may send at once has its own slot for a command: one that was interrupted
+/// in the middle of its slot does not stop the others, and the highest ticket counts.
 ///
 /// Each side holds a lock on a byte of the file, which ends with its process: one adapter and one
 /// controller at a time. The file of a killed adapter is used again, by a new session.

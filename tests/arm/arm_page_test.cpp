@@ -188,7 +188,7 @@ TEST_CASE("page: one adapter of a name, and one controller") {
   const auto end = open_end();
   REQUIRE(end);
   CHECK(error_of<kerf::ArmPageError>([] { open_end(); }) ==
-        "the kerf-arm named touch serves another controller; stop that one, or name another arm");
+        "the kerf-arm named touch serves another controller; stop that one, or name another");
   const ArmPageAdapter other("left", Personality::touch, 1000);  // two arms
   CHECK(absence_of("left") == Absence::starting);
 }

@@ -448,7 +448,7 @@ TEST_CASE("arm: a killed adapter is a lost device to a running controller") {
   CHECK(report.at("unexpected_call").get<std::string>().empty());
 }
 
-TEST_CASE("arm: a second adapter of one name is refused, another name is another arm") {
+TEST_CASE("arm: a second adapter of one name is refused, another name is another kerf-arm") {
   Bench bench;
   const auto arm = bench.arm("touch", "");
   REQUIRE(eventually([&] { return runs(*arm); }, 10s));

@@ -23,19 +23,19 @@ constexpr std::int64_t kPollNs = 50'000;
 std::string absent_text(const std::string& name, Personality device,
                         ArmPageController::Absence absence, const std::string& said) {
   const std::string word(word_of(device));
-  const std::string arm = name == word ? "kerf-arm for " + word : "kerf-arm named " + name;
+  const std::string adapter = name == word ? "kerf-arm for " + word : "kerf-arm named " + name;
   const std::string start =
       "start ./kerf arm --device " + word + (name == word ? "" : " --name " + name);
   const std::string reason = said.empty() ? "" : " (" + one_line(said) + ")";
   switch (absence) {
     case ArmPageController::Absence::no_adapter:
-      return "no " + arm + "; " + start;
+      return "no " + adapter + "; " + start;
     case ArmPageController::Absence::starting:
-      return "the " + arm + " is not ready" + reason + "; see what it waits for";
+      return "the " + adapter + " is not ready" + reason + "; see what it waits for";
     case ArmPageController::Absence::over:
       break;
   }
-  return "the " + arm + " has ended" + reason + "; " + start;
+  return "the " + adapter + " has ended" + reason + "; " + start;
 }
 
 /// The kerf-arm beside this program, in a process group of its own: a terminal's signals reach the
