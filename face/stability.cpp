@@ -104,12 +104,12 @@ std::string problem_in(const SampledLoop& loop) {
 }
 
 SampledLoop device_loop(std::string_view device, double rate_hz) {
-  const auto found = std::ranges::find(kPersonalityWords, device);
-  if (found == kPersonalityWords.end()) {
+  const auto personality = personality_of(device);
+  if (!personality) {
     throw Error("device: " + one_line(device) + unknown_word(device, kPersonalityWords));
   }
   require_within("rate_hz", rate_hz, 1, 1e6);
-  return unheld_loop(static_cast<Personality>(found - kPersonalityWords.begin()), rate_hz);
+  return unheld_loop(*personality, rate_hz);
 }
 
 LimitCycle run_on_wall(const WallRun& run) {

@@ -30,12 +30,9 @@
 namespace kerf::web {
 namespace {
 
-Personality personality_of(const std::string& word) {
-  const auto found = std::ranges::find(kPersonalityWords, word);
-  if (found == kPersonalityWords.end()) {
-    throw LoadError("device: " + one_line(word) + unknown_word(word, kPersonalityWords));
-  }
-  return static_cast<Personality>(found - kPersonalityWords.begin());
+Personality known_device(const std::string& word) {
+  if (const auto personality = personality_of(word)) return *personality;
+  throw LoadError("device: " + one_line(word) + unknown_word(word, kPersonalityWords));
 }
 
 SceneSource source_of(const TabInputs& inputs) {
@@ -43,7 +40,7 @@ SceneSource source_of(const TabInputs& inputs) {
   for (const std::string& setting : inputs.settings) {
     source.overrides.settings.push_back(parse_setting(setting));
   }
-  source.overrides.personality = personality_of(inputs.device);
+  source.overrides.personality = known_device(inputs.device);
   source.overrides.torque_scale = torque_scale_in_text(*source.overrides.personality);
   source.overrides.pedal = inputs.pedal;
   return source;

@@ -9,6 +9,7 @@
 
 #include "controller/stability/limit_cycle.hpp"
 #include "controller/stability/sampled_loop.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 
 // Exact simulation of one axis: device and hand under a held force, with Coulomb friction, encoder
 // and delay; and a hand that pushes on a wall.
@@ -32,7 +33,7 @@ struct HoldResponse {
   const double damper =
       (loop.viscous_ns_per_mm + loop.hand.damping_ns_per_mm) * per_n / loop.period_s;
   // exp of the 3 x 3 generator of (place, speed, force): Taylor for a short time, then squared.
-  using Matrix = std::array<std::array<double, 3>, 3>;
+  using vec3::Matrix;
   const auto times = [](const Matrix& a, const Matrix& b) {
     Matrix c{};
     for (std::size_t i = 0; i < 3; ++i) {

@@ -14,6 +14,7 @@
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/numeric/elementary.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf {
 namespace {
@@ -25,7 +26,7 @@ constexpr double kRimAngle = 0.2;    // rad
 constexpr double kBeforeRim = 0.05;  // of the distance of rings; tuned, see the header
 constexpr double kGoldenAngle = 2.399963229728653;  // pi (3 - sqrt(5))
 
-using Point = std::array<double, 3>;
+using Point = vec3::Vec;
 using Profile = std::vector<std::array<double, 2>>;  // {y, radius}
 
 double length_of(const std::array<double, 2>& a, const std::array<double, 2>& b) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "controller/input/sandbox.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 
 // The closed mesh of a tool, and the STL file that it comes from.
 
@@ -23,7 +24,7 @@ inline constexpr double kLargestMeshMm =
 /// The closed surface of a tool in its own frame: the spindle turns about y, the shaft is toward
 /// +y, and the middle of its height is at y = 0. Whole nanometres, so that they are short as text.
 struct ToolMesh {
-  using Point = std::array<double, 3>;
+  using Point = vec3::Vec;
   using Triangle = std::array<std::uint32_t, 3>;  ///< counter-clockwise from outside
 
   std::vector<Point> points_mm;

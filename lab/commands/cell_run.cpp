@@ -68,13 +68,6 @@ std::string device_of(const CellJob& job) {
   return set.empty() ? "omni" : set;
 }
 
-/// The personality of that name. If there is none, the first: the programs refuse the name later.
-Personality personality_of(const std::string& word) {
-  const auto found = std::ranges::find(kPersonalityWords, word);
-  return static_cast<Personality>(
-      found == kPersonalityWords.end() ? 0 : found - kPersonalityWords.begin());
-}
-
 /// The verdict of `LimitCycleDetector` on the contacts of a run of the whole servo, tick by tick.
 ///
 /// A detector watches for `kSeconds`; one begins every `kApartS` while the tool touches, so that
@@ -316,7 +309,9 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   if (!known) return std::nullopt;
   if (*known != 0) return result_of(*known, folder, described.last_line());
 
-  TickFollower ticks(job.name, folder / "until", personality_of(device_of(job)));
+  // A word that is no device's is refused by the programs.
+  const Personality personality = personality_of(device_of(job)).value_or(Personality{});
+  TickFollower ticks(job.name, folder / "until", personality);
   std::vector<std::string> servo{program_beside("controller"), "--scene", job.scene};
   for (const std::string& setting : job.settings) {
     servo.emplace_back("--set");

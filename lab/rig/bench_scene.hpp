@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "controller/kernel/sampling.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 // Volumes, tools and places of the benchmarks.
 namespace kerf::bench {
 
-using Place = std::array<double, 3>;
-using Matrix = std::array<std::array<double, 3>, 3>;
+using Place = vec3::Vec;
+using vec3::Matrix;
 
 /// A value that the compiler must compute.
 inline volatile std::int64_t g_sink = 0;

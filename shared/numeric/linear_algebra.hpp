@@ -12,6 +12,7 @@
 namespace kerf::vec3 {
 
 using Vec = std::array<double, 3>;
+using Matrix = std::array<Vec, 3>;  ///< rows
 
 [[nodiscard]] inline Vec operator+(const Vec& a, const Vec& b) noexcept {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};

@@ -21,7 +21,7 @@
 
 namespace kerf {
 
-using Matrix = std::array<std::array<double, 3>, 3>;
+using vec3::Matrix;
 
 [[nodiscard]] inline Matrix matrix_of(const std::array<double, 4>& quaternion) {
   const Matrix3 m = rotation_of(quaternion);

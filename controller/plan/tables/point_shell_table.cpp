@@ -6,11 +6,12 @@
 #include <cmath>
 
 #include "shared/numeric/elementary.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf {
 namespace {
 
-using Point = std::array<double, 3>;
+using Point = vec3::Vec;
 
 constexpr std::size_t kGroup = kPointGroup;
 
