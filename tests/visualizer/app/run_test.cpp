@@ -378,7 +378,6 @@ TEST_CASE("n writes the window's view, and a headless run from there shows the s
   options.size = {320, 240};
   options.panels = false;
   options.renderer_is_given = true;
-  std::vector<fs::path> shots;
   {
     const auto context = make_headless_context();
     WindowRun run(options, Session("test"), *context);
