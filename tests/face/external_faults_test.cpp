@@ -112,7 +112,7 @@ TEST_CASE("no program breaks a limit of any device, also if the device has fault
         const bool within = std::isfinite(now_n) && now_n <= kPeakN;
         const bool smooth = !on || length(change) <= std::max(kSlewN, before_n) + kRoundingN;
         broken += off_is_off && fault_is_off && within && smooth ? 0 : 1;
-        rendered_n = std::max(felt_n, now_n);
+        rendered_n = std::max(rendered_n, now_n);
       }
       CHECK(broken == 0);
     }
