@@ -45,11 +45,11 @@ def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, **axes):
     `seed` on. seconds: to which a run that is still open is followed, at least. threads: 0
     for all cores; the map is the same. Returns a kerf.Map. Takes seconds to hours (docs/stability.md); Ctrl-C raises
     kerf.Interrupted with the Map of the columns that are done. Raises kerf.Error."""
-    axes = _device_by_its_figures(axes)
-    names = list(axes)
-    given = [(name, _text(name, axes[name])) for name in names]
+    figures = _device_by_its_figures(axes)
+    given = [(name, _text(name, value)) for name, value in figures.items()]
     measured, ended = _kerf.map_of(_text("stiffness", stiffness), given, seconds, seed, seeds, threads)
-    made = _map_of(measured, names)
+    named = {"device": axes["device"]} if figures is not axes else {}
+    made = _map_of(measured, list(axes), [{**dict(zip(figures, column.values)), **named} for column in measured.columns])
     if ended:
         raise Interrupted(made)
     return made
@@ -85,11 +85,12 @@ def _text(name, values):
     return ",".join(str(item) if items.dtype.kind == "U" else repr(item.item()).removesuffix(".0") for item in items)
 
 
-def _map_of(measured, names):
+def _map_of(measured, names, values):
+    """values: {name of an axis: value} of each column; the axes `names` are shown."""
     columns = measured.columns
-    axes = {name: list(dict.fromkeys(column.values[i] for column in columns)) for i, name in enumerate(names)}
+    axes = {name: list(dict.fromkeys(of_column[name] for of_column in values)) for name in names}
     # The lab orders axes by a list of its own; here they stand as they were given.
-    place = [tuple(axes[name].index(value) for name, value in zip(names, column.values)) for column in columns]
+    place = [tuple(axes[name].index(of_column[name]) for name in names) for of_column in values]
     shape = tuple(len(values) for values in axes.values())
     count = len(measured.stiffness_n_per_mm)
     seeds = max((len(column.swing_by_seed_n_per_mm) for column in columns), default=1)

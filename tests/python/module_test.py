@@ -329,7 +329,9 @@ class TestMaps(Case):
 
     def test_each_family_has_a_map(self):
         for device in ("omega", "touch", "inverse3"):
-            made = kerf.zwidth(device=device, stiffness=[0.5, 30], damping=0.002, seeds=1, seconds=1)
+            made = kerf.zwidth(damping=[0.002, 0], device=device, stiffness=[0.5, 30], seeds=1, seconds=1)
+            self.assertEqual(made.axes, {"damping": ["0", "0.002"], "device": [device]})
+            self.assertEqual(made.rests.shape, (2, 1, 2))
             self.assertTrue(made.rests[..., 0].all() or made.swings.any(), device)
             self.assertEqual((kerf.map_loop(device).delay_s, kerf.map_loop(device, 4000).delay_s), (0.001, 0.00025))
             self.assertEqual(kerf.device_loop(device, 4000).delay_s, 0.002)
