@@ -117,7 +117,7 @@ class LogClock {
 /// or a row is damaged or not later than the row before.
 [[nodiscard]] LogClock read_clock(const std::filesystem::path& folder, bool is_named);
 
-/// As 2026-11-29T13:40:12.345678Z, rounded down.
+/// Text such as 2026-11-29T13:40:12.345678Z, rounded down.
 [[nodiscard]] std::string date_text(std::int64_t utc_ns);
 
 }  // namespace kerf

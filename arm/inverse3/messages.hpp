@@ -95,7 +95,7 @@ struct ServiceEvent {
   ShortText device_id;    ///< data.device_id
   ShortText safety_type;  ///< data.safety_type, such as ebrake_triggered
 };
-/// As `parse_state`.
+/// Reads an event; the rules of `parse_state` hold.
 [[nodiscard]] bool parse_event(std::string_view text, ServiceEvent& event);
 
 /// The key of the force in `set_cursor_force`: `vector` since 3.5, `values` before. A service

@@ -19,7 +19,7 @@ inline constexpr KernelShape kNeonShape{"neon", 8, false};
 inline constexpr KernelShape kSimd128Shape{"simd128", 8, false};
 inline constexpr KernelShape kScalarShape{"scalar", 16, false};
 
-/// Those of all sets that kerf has, whatever processor this is.
+/// Shapes of all instruction sets that kerf supports, on any processor.
 inline constexpr KernelShape kKernelShapes[] = {kAvx512Shape, kAvx2Shape, kNeonShape, kSimd128Shape,
                                                 kScalarShape};
 

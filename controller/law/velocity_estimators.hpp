@@ -35,7 +35,7 @@ class VelocityWindow {
   static constexpr std::int32_t kIntervals = 16;
   static constexpr std::int32_t kMaxStride = 8;
 
-  /// As if at rest here before.
+  /// Begins with a tip that has been at rest at `tip_mm`.
   constexpr void start(DeviceVec<Real> tip_mm) noexcept { ring_.fill(tip_mm); }
 
   /// Adds the tip `gap` ticks after the last one. Missing positions between are interpolated, as if

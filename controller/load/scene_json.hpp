@@ -44,7 +44,7 @@ struct SceneSource {
 [[nodiscard]] SceneSource read_source(const std::filesystem::path& scene,
                                       const SceneOverrides& overrides);
 
-/// As `load_scene` of its path. Throws LoadError.
+/// Loads the scene of a source. Throws LoadError.
 [[nodiscard]] LoadedScene load_scene(const SceneSource& source, RecordedInputs recorded = {});
 
 /// The canonical text of `root`, the `scene_json` of a scene, with one more member `source`: what
@@ -65,7 +65,7 @@ struct InputsInJson {
 /// form.
 [[nodiscard]] SceneSource source_in(std::string_view json);
 
-/// Such a text without its source: what `canonical_json` gave. Throws JsonError.
+/// The text of `json_with_source` without the source: the `canonical_json`. Throws JsonError.
 [[nodiscard]] std::string json_without_source(std::string_view json);
 
 }  // namespace kerf

@@ -131,7 +131,7 @@ class GuidedHand {
   /// The goal of the next bus cycle, while the tip is at `tip_mm`. `start` is the goal at which its
   /// path to the workpiece has ended.
   [[nodiscard]] HandGoal next(const HandGoal& start, DeviceVec<double> tip_mm) noexcept;
-  /// As constructed: no user leads it.
+  /// Returns to the state after construction: no user leads it.
   void restart() noexcept;
   /// It has parked as long as it should; its path begins anew.
   [[nodiscard]] bool parked() const noexcept { return parked_for_ >= cycles_of(kParkedS); }

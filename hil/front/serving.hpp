@@ -28,7 +28,7 @@ class PacketLink {
   /// reports whether the peer is gone. Never blocks.
   [[nodiscard]] virtual std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept = 0;
-  /// As `take`, but waits up to `timeout_ms` for a packet.
+  /// Takes the oldest packet; waits up to `timeout_ms` for one.
   [[nodiscard]] std::span<const std::uint8_t> wait(std::span<std::uint8_t> buffer,
                                                    int timeout_ms) noexcept;
   /// Never blocks: `full` if the peer does not read.

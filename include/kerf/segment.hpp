@@ -41,7 +41,7 @@ class Segment {
   [[nodiscard]] bool alive() const noexcept;
   [[nodiscard]] std::size_t arms() const noexcept;
   [[nodiscard]] double period_s() const noexcept;
-  /// As `Scene::json`, with the scene's source.
+  /// The scene's `Scene::json`, and its source.
   [[nodiscard]] const std::string& scene_json() const noexcept;
 
   /// The newest tick of an arm; empty before the first one.

@@ -74,7 +74,7 @@ struct PictureFigures {
   PictureSize size;
   std::size_t cores = 0;
 };
-/// As JSON (lab/report/pictures.py has its form).
+/// The figures as JSON (lab/report/pictures.py reads it).
 [[nodiscard]] std::string picture_report(const PictureFigures& figures);
 
 }  // namespace kerf

@@ -8,7 +8,7 @@
 
 namespace kerf {
 
-/// As many as the segment has descriptors for.
+/// Most volumes: the segment has descriptors for this number.
 inline constexpr int kMaxCastVolumes = static_cast<int>(kMaxVolumes);
 
 /// Edge of the square blocks of pixels that share one `CastBlock`.

@@ -110,7 +110,7 @@ struct OverlayFigures {
   /// Of the letters, over those for 96 dots per inch; as far as the picture has room.
   double scale = 1.0;
 
-  /// As far as the panel shows them: two equal ones look alike.
+  /// The figures with the digits that the panel shows: two equal ones look alike.
   [[nodiscard]] OverlayFigures rounded() const;
   friend bool operator==(const OverlayFigures&, const OverlayFigures&) noexcept = default;
 };

@@ -26,7 +26,7 @@ class SeenBodies {
   /// renderer cannot show it.
   SeenBodies(const Session& session, const Picture& picture, PictureSize size, AovChoice choice);
 
-  /// As `Picture::update`.
+  /// Takes what changed in the session; call it with `Picture::update`.
   void update(const Session& session);
 
   /// Rows from the top. `depth`: mm from the eye along the view axis, infinite where nothing is

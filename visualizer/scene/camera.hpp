@@ -15,8 +15,8 @@ namespace kerf {
 /// The eight corners, in world mm, of a box of any orientation that a picture should show.
 using BoxCorners = std::array<glm::dvec3, 8>;
 
-/// Those of the box from `low` to `high` that stands at `pose`; bit 0 of the index: high x, bit 1:
-/// high y, bit 2: high z.
+/// Corners of the box from `low` to `high` that stands at `pose`; bit 0 of the index: high x, bit
+/// 1: high y, bit 2: high z.
 [[nodiscard]] inline BoxCorners box_corners(const glm::dvec3& low, const glm::dvec3& high,
                                             const glm::dmat4& pose = glm::dmat4(1.0)) {
   BoxCorners corners;
@@ -97,7 +97,7 @@ struct SeenPoint {
   double depth_mm = 0.0;  ///< not positive: behind the eye, and `pixel` means nothing
 };
 [[nodiscard]] SeenPoint seen_at(const View& view, PictureSize size, const glm::dvec3& world_mm);
-/// And back.
+/// The inverse of `seen_at`.
 [[nodiscard]] glm::dvec3 world_at(const View& view, PictureSize size, const SeenPoint& seen);
 
 /// Pixels of a picture that what lies within the hull of `corners` can cover; all of them if a

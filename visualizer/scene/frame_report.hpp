@@ -47,7 +47,7 @@ struct FrameReport {
   /// drawing the first one with the tool elsewhere. The event itself came up to a frame earlier.
   std::vector<double> pointer_ms{};
 
-  /// As JSON, whole or not at all; throws FileError.
+  /// Writes the report as JSON, whole or not at all; throws FileError.
   void write(const std::filesystem::path& file) const;
 };
 

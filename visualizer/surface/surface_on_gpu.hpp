@@ -155,7 +155,7 @@ class SurfaceOnGpu {
   void find_visible(const VolumeSurface& surface, const FrustumCulling& culling);
   /// Room for all that the pools hold.
   void grow();
-  /// And lets the commands of `of_picked_` read from there.
+  /// Uploads the triangles of `picked_`; the commands of `of_picked_` read them.
   void upload_picked();
 
   std::vector<Part> parts_;            ///< by block

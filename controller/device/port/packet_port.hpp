@@ -32,11 +32,11 @@ class PacketPort {
   /// False when the packet could not be sent now; the next tick sends a newer one.
   virtual bool send(std::span<const std::uint8_t> packet) noexcept = 0;
 
-  /// As `send`, but where host and device take turns, out of turn.
+  /// Sends at once, even if it is the device's turn.
   virtual bool send_now(std::span<const std::uint8_t> packet) noexcept { return send(packet); }
 
-  /// As `send_now`, but for the last packet of a process that may end at once: where packets leave
-  /// by another thread, it waits up to 20 ms until this one has left.
+  /// Sends at once the last packet of a process that may end: if packets leave by another thread,
+  /// it waits up to 20 ms until this one has left.
   virtual bool send_last(std::span<const std::uint8_t> packet) noexcept { return send(packet); }
 
   /// True once no packet of the device will come any more, because it ended the link or is gone.

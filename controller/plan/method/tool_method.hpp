@@ -82,7 +82,7 @@ class MethodMemory {
                                  const KernelSet& kernels);
   /// The tool's samples for fixed point in any pose, the same for all its volumes.
   void hold_samples(const SceneTool& tool, SampleOrder order);
-  /// Those of the last tool of `hold_samples`, if it is this one; at a fixed address.
+  /// The samples of the last tool of `hold_samples`, if it is `tool`; at a fixed address.
   [[nodiscard]] SampleTable samples_of(const SceneTool& tool) const noexcept;
   /// The allocated arrays, by name.
   [[nodiscard]] std::vector<ArrayBytes> arrays() const;

@@ -127,7 +127,7 @@ class OmniRegisters {
   [[nodiscard]] int listens_on() const noexcept { return listen_channel_; }
   [[nodiscard]] int transmits_on() const noexcept { return transmit_channel_; }
   [[nodiscard]] std::uint32_t mode_20010() const noexcept { return mode_20010_; }
-  /// As after power-up.
+  /// Resets to the state after power-up.
   void reset() noexcept { *this = OmniRegisters(packed_serial_); }
 
  private:

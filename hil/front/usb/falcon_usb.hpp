@@ -147,7 +147,7 @@ class FalconUsb {
 
   /// To the present: reads are completed, faults are applied.
   void catch_up(UsbHost& host);
-  /// As `FtdiFalcon::control`, and frees a halted endpoint if the request asks for it.
+  /// `FtdiFalcon::control`; also frees a halted endpoint if the request asks for it.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> control(const UsbSetup& setup);
   /// Frees an endpoint; returns false if there is none of that address.
   bool clear_halt(unsigned endpoint) noexcept;
