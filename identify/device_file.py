@@ -59,6 +59,8 @@ def report(found, period_s):
 
 
 def remarks(found):
+    if found.joint_friction:
+        yield "Coulomb friction acts against the direction of the motion as a whole, f v / |v|, rather than on each axis alone"
     missing = [axis for axis in "xyz" if axis not in found.moved]
     if missing:
         yield f"{', '.join(missing)} did not move by 20 steps of the encoder: nothing is known of it; free it, or give it more force"

@@ -26,6 +26,8 @@ BLOCK_S = 1.0
 REPLICATES = 400
 TRIMMED = 4.0          # usual sizes of a residual: beyond them lies a reversal that the model got wrong; at most 7 % of all rows
 SPOILT = 0.3           # of the force of a block unexplained: something outside of the arm; of all of it: no arm of this model
+POOR = 0.01            # of the force unexplained: worth a look at friction against the motion as a whole,
+BETTER = 0.8           # which has to leave clearly less
 # Half widths below which no interval is stated, as parts of the value (of the delay: periods): what reversals that are a part of a
 # tick off leave, which no bootstrap shows. From the emulated arms of tests/identify/study.py.
 FLOORS = np.array([0.003] * 6 + [0.02] * 3 + [0.005] * 3 + [0.005] * 3 + [0.005] * 3 + [0.02])
@@ -52,6 +54,7 @@ class Estimate:
     high: np.ndarray
     quantum_m: np.ndarray
     mode: object
+    joint_friction: bool   # against the direction of the whole motion, in place of each axis' own
     moved: list            # axes that moved
     unexplained: float     # share of the force's rms that no parameter explains
     whiteness: np.ndarray  # p of Ljung and Box, by axis
@@ -89,8 +92,8 @@ def _robust(values):
 class _Fit:
     """The rows of a log, and the fit of all parameters to them."""
 
-    def __init__(self, motion, axes, quantum_m):
-        self.m, self.axes = motion, axes
+    def __init__(self, motion, axes, quantum_m, joint_friction):
+        self.m, self.axes, self.joint_friction = motion, axes, joint_friction
         self.t = motion.period_s
         self.noise = np.maximum(quantum_m / np.sqrt(12), 1e-8)
         count = len(motion.place_m)
@@ -113,6 +116,10 @@ class _Fit:
         self.still = self._unmoved(5, 1.5)
 
     def _directions(self):
+        if self.joint_friction:
+            whole = np.linalg.norm(self.speed[:, self.axes], axis=1, keepdims=True)
+            along = self.speed / np.maximum(whole, np.linalg.norm(self.noise_of_speed[self.axes]))
+            return (along + np.concatenate([along[1:], along[-1:]])) / 2, along
         found = [directions(self.speed[:, i]) for i in range(3)]
         return np.stack([f[0] for f in found], 1), np.stack([f[1] for f in found], 1)
 
@@ -156,6 +163,9 @@ class _Fit:
         # At a reversal under less than the friction the tip stays; static friction may be a quarter more.
         slow = np.abs(self.speed) < np.maximum(4 * self.noise_of_speed, np.abs(acceleration) * self.t)
         held = (slow | self.still) & (np.abs(drive) < 1.25 * th[_F:_G])
+        if self.joint_friction:
+            free = np.linalg.norm(drive[:, i], axis=1) > 1.25 * np.linalg.norm(th[_F:_G][i]) / np.sqrt(len(i))
+            held = np.repeat(((slow | self.still)[:, i].all(axis=1) & ~free)[:, None], 3, axis=1)
         reach = 3
         wide = held.copy()
         for by in range(1, reach + 1):
@@ -293,18 +303,9 @@ def _ljung_box(series, lags=10):
     return float(np.exp(-q / 2) * terms.sum())
 
 
-def estimate(motion, seed=1):
-    """Raises NoEstimate."""
-    place = motion.place_m
-    count = len(place)
-    if motion.good.sum() * motion.period_s < 2.0:
-        raise NoEstimate(f"{motion.good.sum() * motion.period_s:.1f} s of sound ticks; at least 2 s of motion are needed")
-    quantum_m = np.array([quantum_of(place[:, i]) for i in range(3)])
-    travel = np.ptp(place[motion.good], axis=0)
-    axes = [i for i in range(3) if travel[i] > 20 * max(quantum_m[i], 1e-6)]
-    if not axes:
-        raise NoEstimate("no axis moved by 20 steps of its encoder: the device is held, its motors are off, or its friction is above the force")
-    fit = _Fit(motion, axes, quantum_m)
+def _fitted(motion, axes, quantum_m, joint_friction):
+    """Share of the force that is left, and the fit."""
+    fit = _Fit(motion, axes, quantum_m, joint_friction)
     fit.scan_delay()
     best = np.inf, fit.theta
     for round_ in range(10):
@@ -320,7 +321,26 @@ def estimate(motion, seed=1):
     # The steps of an arm that sticks most of the time need not come closer.
     fit.theta = best[1]
     fit.follow()
-    if not best[0] < SPOILT:
+    return best[0], fit
+
+
+def estimate(motion, seed=1):
+    """Raises NoEstimate."""
+    place = motion.place_m
+    count = len(place)
+    if motion.good.sum() * motion.period_s < 2.0:
+        raise NoEstimate(f"{motion.good.sum() * motion.period_s:.1f} s of sound ticks; at least 2 s of motion are needed")
+    quantum_m = np.array([quantum_of(place[:, i]) for i in range(3)])
+    travel = np.ptp(place[motion.good], axis=0)
+    axes = [i for i in range(3) if travel[i] > 20 * max(quantum_m[i], 1e-6)]
+    if not axes:
+        raise NoEstimate("no axis moved by 20 steps of its encoder: the device is held, its motors are off, or its friction is above the force")
+    share, fit = _fitted(motion, axes, quantum_m, False)
+    if share > POOR and len(axes) > 1:
+        other, joint = _fitted(motion, axes, quantum_m, True)
+        if other < BETTER * share:
+            share, fit = other, joint
+    if not share < SPOILT:
         raise NoEstimate(f"mass, friction and delay explain less than {1 - SPOILT:.0%} of the force: friction may take most of it (a higher limit "
                          "helps), something else moves the device, or it is no arm of this model")
     return _with_intervals(fit, quantum_m, seed)
@@ -379,7 +399,7 @@ def _with_intervals(fit, quantum_m, seed):
     together = [(NAMES[u[m]], NAMES[u[n]], float(correlation[m, n])) for m in range(len(u)) for n in range(m)
                 if abs(correlation[m, n]) > 0.95]
     share, white = _checks(fit, parts)
-    return Estimate(values, low, high, quantum_m, fit.mode, [AXES[i] for i in fit.axes], share, white, together,
+    return Estimate(values, low, high, quantum_m, fit.mode, fit.joint_friction, [AXES[i] for i in fit.axes], share, white, together,
                     _spans(fit.spoilt, fit.t), float(fit.m.good.sum() * fit.t))
 
 

@@ -110,6 +110,33 @@ class TestArms(unittest.TestCase):
             estimate.estimate(motion)
 
 
+class TestFrictionOfTheWholeMotion(unittest.TestCase):
+    def test_friction_against_the_motion_as_a_whole_is_told_from_that_of_each_axis(self):
+        mass, viscous, coulomb, quantum, parts = 0.12, 0.8, 0.15, 1e-5, 10
+        ticks, h = 20000, 0.001 / parts
+        random = np.random.Generator(np.random.PCG64(3))
+        hz, phases = np.geomspace(1.0, 40.0, 12), random.uniform(0, 2 * np.pi, (12, 3))
+        place, speed, before = np.zeros(3), np.zeros(3), np.zeros(3)
+        places, forces = np.zeros((ticks, 3)), np.zeros((ticks, 3))
+        for tick in range(ticks):
+            places[tick] = np.floor(place / quantum) * quantum
+            forces[tick] = 0.2 * np.sin(2 * np.pi * hz[:, None] * tick * 0.001 + phases).sum(axis=0) - 30.0 * places[tick]
+            for _ in range(parts):  # the force of the tick before acts
+                kick = speed + h / mass * (before - viscous * speed)
+                size = np.sqrt(kick @ kick)
+                kick = kick * max(0.0, 1 - h * coulomb / mass / max(size, 1e-12))
+                place, speed = place + h * (speed + kick) / 2, kick
+            before = forces[tick]
+        found = estimate.estimate(estimate.Motion(0.001, places, forces, np.ones(ticks, bool)))
+        self.assertTrue(found.joint_friction)
+        self.assertLess(found.unexplained, 0.05)
+        self.assertLess(np.abs(found.values[:3] / mass - 1).max(), 0.03)
+        self.assertLess(np.abs(found.values[6:9] / viscous - 1).max(), 0.10)
+        self.assertLess(np.abs(found.values[9:12] / coulomb - 1).max(), 0.05)
+        self.assertLess(abs(found.values[18] - 1), 0.1)
+        self.assertRegex("\n".join(device_file.remarks(found)), "motion as a whole")
+
+
 class TestHand(unittest.TestCase):
     def test_a_push_from_outside_is_noticed_and_left_out(self):
         arms = emulated.draw(5, 1)[[4]]
