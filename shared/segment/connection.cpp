@@ -148,6 +148,18 @@ namespace {
 
 constexpr timeval kAnswerTimeout{2, 0};  // the server's thread is never busy for long
 
+/// The result of a call on a socket with a timeout, made again if a signal interrupts it: Linux
+/// does not restart such a call, not even after a program was only stopped and continued
+/// (signal(7)).
+template <class Call>
+[[nodiscard]] ssize_t uninterrupted(const Call& call) {
+  ssize_t result = 0;
+  do {
+    result = call();
+  } while (result < 0 && errno == EINTR);
+  return result;
+}
+
 /// Receives the hello and the descriptor passed with it.
 [[nodiscard]] OwnedFd receive_segment(int socket, const std::string& path) {
   SegmentHello hello;
@@ -158,7 +170,7 @@ constexpr timeval kAnswerTimeout{2, 0};  // the server's thread is never busy fo
   header.msg_iovlen = 1;
   header.msg_control = control;
   header.msg_controllen = sizeof control;
-  const ssize_t length = recvmsg(socket, &header, MSG_CMSG_CLOEXEC);
+  const ssize_t length = uninterrupted([&] { return recvmsg(socket, &header, MSG_CMSG_CLOEXEC); });
   OwnedFd segment;
   const cmsghdr* const rights = CMSG_FIRSTHDR(&header);
   if (length > 0 && rights != nullptr && rights->cmsg_level == SOL_SOCKET &&
@@ -215,7 +227,7 @@ bool SegmentConnection::alive() const noexcept {
 
 Reply SegmentConnection::send(const SegmentCommand& command) {
   while (awaited_ > 0) receive();
-  if (::send(socket_, &command, sizeof command, MSG_NOSIGNAL) !=
+  if (uninterrupted([&] { return ::send(socket_, &command, sizeof command, MSG_NOSIGNAL); }) !=
       static_cast<ssize_t>(sizeof command)) {
     throw no_answer();
   }
@@ -225,7 +237,8 @@ Reply SegmentConnection::send(const SegmentCommand& command) {
 
 Reply SegmentConnection::receive() {
   Reply reply;
-  if (recv(socket_, &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) {
+  if (uninterrupted([&] { return recv(socket_, &reply, sizeof reply, 0); }) !=
+      static_cast<ssize_t>(sizeof reply)) {
     throw no_answer();
   }
   --awaited_;

@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -60,8 +61,13 @@ class TestLogFiles(unittest.TestCase):
                 time.sleep(0.02)
             programs.append(subprocess.Popen([BIN / "kerf-controller", "--scene", ROOT / "scenes/wall.toml", "--name", "killed", "--port",
                                               f"socket:{device}", "--torque-scale", "1,1,1"], **quiet))
-            while not ticks.exists() or ticks_in(ticks) < 500 or len(np.load(ticks, mmap_mode="r")) == ticks_in(ticks):
-                time.sleep(0.01)  # killed between two of its headers
+            while True:  # killed between two of its headers: it stands still while the file is looked at
+                recorder.send_signal(signal.SIGSTOP)
+                os.waitid(os.P_PID, recorder.pid, os.WSTOPPED)
+                if ticks.exists() and ticks_in(ticks) >= 500 and len(np.load(ticks, mmap_mode="r")) < ticks_in(ticks):
+                    break
+                recorder.send_signal(signal.SIGCONT)
+                time.sleep(0.01)
             recorder.kill()
         finally:
             for program in programs:

@@ -161,6 +161,41 @@ TEST_CASE("the socket that a killed controller left is replaced") {
   close(ready[1]);
 }
 
+TEST_CASE("a client that is stopped and continued while it waits for the greeting gets it") {
+  const RuntimeFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  std::array<int, 2> ready{};
+  REQUIRE(pipe(ready.data()) == 0);
+  const pid_t server = in_child([&] {
+    const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+    const SegmentServer serving("demo", writer);
+    if (write(ready[1], "g", 1) != 1) return 1;
+    for (;;) pause();
+  });
+  char go = 0;
+  REQUIRE(read(ready[0], &go, 1) == 1);
+  const auto stop = [](pid_t process) {
+    kill(process, SIGSTOP);
+    int status = 0;
+    return waitpid(process, &status, WUNTRACED) == process && WIFSTOPPED(status);
+  };
+  REQUIRE(stop(server));  // its socket takes clients, but nobody greets them
+  const pid_t client = in_child([] { return connect_segment("demo").alive() ? 0 : 1; });
+  bool waits = true;
+  for (int i = 0; i < 40 && waits; ++i) {
+    usleep(5000);
+    waits = stop(client);
+    if (waits) kill(client, SIGCONT);
+  }
+  CHECK(waits);
+  kill(server, SIGCONT);
+  if (waits) CHECK(status_of(client) == 0);
+  kill(server, SIGKILL);
+  status_of(server);
+  close(ready[0]);
+  close(ready[1]);
+}
+
 TEST_CASE("commands arrive in order; the 65th that nobody takes gets BUSY, later ones do not") {
   const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
