@@ -31,7 +31,7 @@ FaultScript faults_of(const std::filesystem::path& file) {
 /// What the driver sends of a tick.
 ServoOutput output_of(const TickRecord& record) noexcept {
   ServoOutput output;
-  std::copy_n(std::begin(record.dac_counts), 3, output.motor_counts.begin());
+  std::copy_n(std::begin(record.dac_counts), 3, output.dac_counts.begin());
   output.motors_on = (record.flags & kFlagMotorsOn) != 0;
   output.phase = static_cast<Phase>(record.phase);
   return output;

@@ -209,7 +209,7 @@ std::string TabRun::facts() const {
                       {"fault", fault_name(s.output.fault)},
                       {"phase", static_cast<int>(s.output.phase)},
                       {"hand_led", s.emulator.accepts_target()},
-                      {"force_n", vec3::length(s.output.force_n)},
+                      {"force_n", vec3::length(s.output.commanded_force_n)},
                       {"removed_density_mm3", removed_density_mm3},
                       {"absorbed_mj", s.output.absorbed_mj},
                       {"energy_mj", std::move(energy)}};

@@ -17,7 +17,7 @@ namespace {
 
 bool pushes(const ServoOutput& sent) noexcept {
   return sent.motors_on &&
-         std::ranges::any_of(sent.motor_counts, [](std::int16_t count) { return count != 0; });
+         std::ranges::any_of(sent.dac_counts, [](std::int16_t count) { return count != 0; });
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ void DeviceDriver::follow_change(const DeviceReport& before) noexcept {
 void DeviceDriver::command(const ServoOutput& output) noexcept {
   ServoOutput allowed = output;
   if (released_.load(std::memory_order_relaxed)) allowed.motors_on = false;
-  if (!allowed.motors_on) allowed.motor_counts = {};
+  if (!allowed.motors_on) allowed.dac_counts = {};
   Packet packet;
   const std::size_t size = compose(allowed, packet);
   const bool lets_go = forcing_ && !allowed.motors_on;
@@ -109,7 +109,7 @@ bool FalconDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
 std::size_t FalconDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
   const bool asks = output.phase == Phase::off || output.phase == Phase::calibrating;
   const bool fault = output.phase == Phase::fault;
-  const auto bytes = encode(FalconCommand{.motor = output.motor_counts,
+  const auto bytes = encode(FalconCommand{.motor = output.dac_counts,
                                           .homing = !homed_,
                                           .green = !asks && !fault,
                                           .blue = asks,
@@ -186,9 +186,8 @@ bool OmniDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report
 }
 
 std::size_t OmniDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
-  const auto bytes = encode(OmniCommand{.motor = output.motor_counts,
-                                        .motors_on = output.motors_on,
-                                        .light = light_of(output.phase)});
+  const auto bytes = encode(OmniCommand{
+      .motor = output.dac_counts, .motors_on = output.motors_on, .light = light_of(output.phase)});
   std::ranges::copy(bytes, packet.begin());
   return bytes.size();
 }
@@ -232,7 +231,7 @@ std::size_t CartesianDriver::compose(const ServoOutput& output, Packet& packet) 
   const Light light = output.phase == Phase::fault ? Light::fault
                       : asks                       ? Light::asks
                                                    : Light::ready;
-  const auto bytes = encode(CartesianCommand{.force_mn = output.motor_counts,
+  const auto bytes = encode(CartesianCommand{.force_mn = output.dac_counts,
                                              .force_on = output.motors_on,
                                              .light = light,
                                              .answers = newest_});
@@ -298,7 +297,7 @@ bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
 }
 
 std::size_t WoodenDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
-  WoodenCommand command{.milliamps = turned(output.motor_counts), .set_encoders = {}};
+  WoodenCommand command{.milliamps = turned(output.dac_counts), .set_encoders = {}};
   if (button_ && (!homed_ || set_due_)) {
     set_due_ = false;
     // The device also releases the button when its encoders are set.

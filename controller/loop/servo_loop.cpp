@@ -34,7 +34,7 @@ class ArmStatistics {
     record_.stale_ticks += output.stale && !is_gone_ ? 1 : 0;
     record_.contact_ticks += output.contact ? 1 : 0;
     record_.shaft_ticks += output.shaft ? 1 : 0;
-    record_.peak_force_n = std::max(record_.peak_force_n, vec3::length(output.force_n));
+    record_.peak_force_n = std::max(record_.peak_force_n, vec3::length(output.commanded_force_n));
     record_.absorbed_mj = output.absorbed_mj;
     record_.port_minimum_mj = output.port_minimum_mj;
     std::ranges::transform(output.energy_steps, record_.energy_mj.begin(), energy_mj_of_steps);
@@ -79,7 +79,8 @@ class RunStatistics {
     ++record_.ticks;
     std::uint64_t forbidden = 0;
     for (const ServoOutput& output : outputs) {
-      if (record_.first_force_ns == 0 && output.motors_on && vec3::length(output.force_n) > 0) {
+      if (record_.first_force_ns == 0 && output.motors_on &&
+          vec3::length(output.commanded_force_n) > 0) {
         record_.first_force_ns = spent.sent_ns;
       }
       for (std::size_t v = 0; v < kMaxVolumes; ++v) {

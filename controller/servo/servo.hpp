@@ -34,7 +34,7 @@ inline constexpr std::size_t kMaxPlaneLoads = 3;
 ///
 /// Physical values are converted from the loop's numbers exactly; nothing here flows back.
 struct ServoOutput {
-  std::array<std::int16_t, 3> motor_counts{};  ///< signed counts of the device, 0 = no torque
+  std::array<std::int16_t, 3> dac_counts{};  ///< signed counts of the device, 0 = no torque
   bool motors_on = false;
   Phase phase = Phase::off;
   Fault fault = Fault::none;
@@ -54,17 +54,17 @@ struct ServoOutput {
   bool pedalled = false;                  ///< nothing is cut without button 1
   bool resetting = false;  ///< volumes go back to their first content: changes are no cuts
 
-  std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
-  std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
-  std::array<double, 3> position_mm{};         ///< tip in the scene
-  std::array<double, 9> rotation{};            ///< world from tool as of the contact, row-major
-  std::array<double, 3> velocity_mm_per_s{};   ///< device port, as estimated
-  std::array<double, 3> force_n{};             ///< sent to the hand, device port
-  std::array<double, 3> contact_n{};           ///< part of it before limits, device port
-  std::array<double, 3> modification_n{};      ///< part from cutting: reaction, or friction
-  std::array<double, 3> torque_n_mm{};         ///< motor torques
-  std::array<double, 3> proxy_offset_mm{};     ///< from the tip to the proxy's, in the scene
-  std::array<double, 3> tip_torque_n_mm{};     ///< of contact and cutting about the tip
+  std::array<std::int32_t, 3> encoder_counts{};  ///< unwrapped since calibration
+  std::array<double, 3> gimbal_rad{};            ///< yaw, pitch, roll
+  std::array<double, 3> position_mm{};           ///< tip in the scene
+  std::array<double, 9> rotation{};              ///< world from tool as of the contact, row-major
+  std::array<double, 3> velocity_mm_per_s{};     ///< device port, as estimated
+  std::array<double, 3> commanded_force_n{};     ///< sent to the hand, device port
+  std::array<double, 3> contact_force_n{};       ///< part of it before limits, device port
+  std::array<double, 3> modification_n{};        ///< part from cutting: reaction, or friction
+  std::array<double, 3> torque_n_mm{};           ///< motor torques
+  std::array<double, 3> proxy_offset_mm{};       ///< from the tip to the proxy's, in the scene
+  std::array<double, 3> tip_torque_n_mm{};       ///< of contact and cutting about the tip
   std::array<PlaneLoad<DoubleNumbers>, kMaxPlaneLoads> planes{};
   std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
   double absorbed_mj = 0;         ///< SUM -F_sent . dx of the run; + = taken from the hand

@@ -106,7 +106,7 @@ std::uint64_t hash_of(std::uint64_t hash, const ServoOutput& out,
       return std::bit_cast<std::uint64_t>(static_cast<double>(value));
     }
   };
-  for (const std::int16_t m : out.motor_counts) {
+  for (const std::int16_t m : out.dac_counts) {
     hash = fnv1a_step(hash, static_cast<std::uint16_t>(m));
   }
   hash = fnv1a_step(hash, word(force_n.x));
@@ -130,7 +130,7 @@ void write_contact(const ContactResult<N>& contact, ServoOutput& out) noexcept {
   out.samples_read = contact.samples_read;
   out.proxy_offset_mm = as_doubles(contact.proxy_offset_mm);
   out.tip_torque_n_mm = as_doubles(contact.tip_torque_n_mm);
-  out.contact_n = as_doubles(contact.contact_n);
+  out.contact_force_n = as_doubles(contact.contact_n);
   out.modification_n = as_doubles(contact.modification_n);
   out.shaft = contact.shaft_force_n > typename N::Real(kContactThresholdN);
   for (std::size_t i = 0; i < contact.plane_count; ++i) {
@@ -155,7 +155,7 @@ void write_output(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N
   const ProxyState<N>& proxy = state.contact.proxy;
   out.refused = plan.contact.swept && !proxy.valid && proxy.search.refused();
   for (std::size_t i = 0; i < 3; ++i) {
-    out.joint_counts[i] = state.encoders.unwrapped[i];
+    out.encoder_counts[i] = state.encoders.unwrapped[i];
     out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
   }
   out.position_mm = as_doubles(sensed.tip_mm);
@@ -166,7 +166,7 @@ void write_output(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N
   if (tool.swept.shaft.count > 0 && proxy.valid) rotation = {rows_of(proxy.pose.orientation)};
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
-  out.force_n = as_doubles(state.force_n);
+  out.commanded_force_n = as_doubles(state.force_n);
   out.absorbed_mj = energy_mj<N>(state.ledger.total_mj());
   out.port_minimum_mj = energy_mj<N>(state.ledger.lowest_mj());
   std::ranges::transform(state.ledger.by_source_mj(), out.energy_steps.begin(), energy_steps<N>);
@@ -309,7 +309,7 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, ForceRequest<N>& want
     return;
   }
   const MotorCommand<N> motors = motor_command(plan, state.jacobian_t_mm * limited_n);
-  out.motor_counts = motors.counts;
+  out.dac_counts = motors.counts;
   state.force_n = {multiply<Real>(motors.scale, limited_n.x),
                    multiply<Real>(motors.scale, limited_n.y),
                    multiply<Real>(motors.scale, limited_n.z)};

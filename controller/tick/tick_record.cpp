@@ -101,14 +101,14 @@ TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
   record.command_argument = commands.command.argument;
   record.last_command = commands.last_index;
   record.flags = flags_of(report, output);
-  std::ranges::copy(output.joint_counts, record.encoder_counts);
+  std::ranges::copy(output.encoder_counts, record.encoder_counts);
   for (std::size_t i = 0; i < 3; ++i) {
     record.encoder_counts[3 + i] =
         static_cast<std::int32_t>(std::lround(output.gimbal_rad[i] * 1000));
   }
   put_pose(output, record);
-  put(record.commanded_force_n, output.force_n);
-  put(record.contact_force_n, output.contact_n);
+  put(record.commanded_force_n, output.commanded_force_n);
+  put(record.contact_force_n, output.contact_force_n);
   put(record.modification_force_n, output.modification_n);
   put(record.joint_torque_n_mm, output.torque_n_mm);
   put(record.tip_torque_n_mm, output.tip_torque_n_mm);
@@ -120,7 +120,7 @@ TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
     std::ranges::copy(floats(as_doubles(plane.normal)), record.plane_normal + 3 * i);
     std::ranges::copy(floats(as_doubles(plane.lever_mm)), record.plane_arm_mm + 3 * i);
   }
-  std::ranges::copy(output.motor_counts, record.dac_counts);
+  std::ranges::copy(output.dac_counts, record.dac_counts);
   record.removed = static_cast<std::uint32_t>(std::accumulate(
       output.returned_by_volume.begin(), output.returned_by_volume.end(), output.removed_steps));
   record.port_energy_j = output.absorbed_mj / 1000.0;

@@ -99,7 +99,7 @@ struct DeviceWire::Kind {
   DeviceVec<double> (*force_n)(const ArmPose&, const JointVec<double>& torque_nmm);
 };
 
-constexpr std::array<DeviceWire::Kind, 6> DeviceWire::kinds() noexcept {
+constexpr std::array<DeviceWire::Kind, kDeviceKinds.size()> DeviceWire::kinds() noexcept {
   using W = DeviceWire;
   return {{{Personality::omni, omni_units, &W::omni_report, &W::omni_command, tip_of<OmniArm>,
             force_of<OmniArm>},

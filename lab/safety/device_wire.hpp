@@ -74,7 +74,7 @@ class DeviceWire {
 
  private:
   struct Kind;  ///< what differs between the devices
-  [[nodiscard]] static constexpr std::array<Kind, 6> kinds() noexcept;
+  [[nodiscard]] static constexpr std::array<Kind, kDeviceKinds.size()> kinds() noexcept;
   [[nodiscard]] static const Kind& kind_of(Personality personality) noexcept;
   using Packet = std::span<const std::uint8_t>;
   [[nodiscard]] std::optional<ObservedReport> omni_report(Packet packet, bool may_count_anew);

@@ -157,7 +157,7 @@ LimitCycle watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit,
       const DeviceVec<double> tip_mm{out.position_mm[0], out.position_mm[1], out.position_mm[2]};
       if (watch)
         watch({dot(true_mm, hit.normal) - hit.wall_mm, dot(rig.plant().velocity, hit.normal)});
-      const bool is_held = true_mm == last_mm && out.force_n == last.force_n;
+      const bool is_held = true_mm == last_mm && out.commanded_force_n == last.commanded_force_n;
       if (detector.take(dot(tip_mm, hit.normal), rig.plant().motor_work_mj, is_held)) {
         return detector.verdict();
       }

@@ -42,7 +42,7 @@ struct HandFiles {
 /// All that a hand has got from its loop up to a tick: so it can be brought there again. 8 bytes a
 /// tick and arm.
 struct Sent {
-  std::array<std::int16_t, 3> motor_counts;
+  std::array<std::int16_t, 3> dac_counts;
   std::uint8_t phase;
   bool motors_on;
 };
@@ -70,7 +70,7 @@ Sent sent_of(const TickRecord& tick) {
 TickRecord record_of(const Sent& sent, Tick tick) {
   TickRecord record{};
   record.tick = tick;
-  std::copy(sent.motor_counts.begin(), sent.motor_counts.end(), record.dac_counts);
+  std::copy(sent.dac_counts.begin(), sent.motor_counts.end(), record.dac_counts);
   record.phase = sent.phase;
   record.flags = sent.motors_on ? kFlagMotorsOn : 0;
   return record;

@@ -84,7 +84,7 @@ TEST_CASE("arm port: a driver above it reads poses and gives forces; the end of 
   kerf::ServoOutput output;
   output.phase = kerf::Phase::active;
   output.motors_on = true;
-  output.motor_counts = {1500, 0, 0};
+  output.dac_counts = {1500, 0, 0};
   driver->command(output);
   CHECK(arm.newest()->command.force_mn[0] == 1500);
   CHECK(arm.newest()->command.answers == 4);

@@ -76,7 +76,7 @@ using Wooden = Bench<kerf::WoodenDriver>;
 
 kerf::ServoOutput forcing(Counts counts) {
   kerf::ServoOutput output;
-  output.motor_counts = counts;
+  output.dac_counts = counts;
   output.motors_on = true;
   output.phase = kerf::Phase::active;
   return output;
@@ -402,7 +402,7 @@ TEST_CASE("cartesian: the force goes out in mN with the light of the phase, and 
   CHECK(sent().light == kerf::CartesianCommand::Light::ready);
   kerf::ServoOutput fault;
   fault.phase = kerf::Phase::fault;
-  fault.motor_counts = {7, 7, 7};  // motors are off: no force, whatever stands here
+  fault.dac_counts = {7, 7, 7};  // motors are off: no force, whatever stands here
   arm.driver.command(fault);
   CHECK(sent().force_mn == Counts{});
   CHECK(sent().light == kerf::CartesianCommand::Light::fault);

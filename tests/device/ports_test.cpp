@@ -251,7 +251,7 @@ struct TorqueLink {
   void tick() {
     static_cast<void>(driver->read());
     kerf::ServoOutput output;
-    output.motor_counts = {100, -100, 100};
+    output.dac_counts = {100, -100, 100};
     output.motors_on = true;
     driver->command(output);
   }

@@ -20,7 +20,7 @@ namespace {
 ServoOutput pushing(bool on) {
   ServoOutput out;
   out.motors_on = true;
-  out.motor_counts = {static_cast<std::int16_t>(on ? 1 : 0), 0, 0};
+  out.dac_counts = {static_cast<std::int16_t>(on ? 1 : 0), 0, 0};
   out.phase = Phase::active;
   return out;
 }

@@ -84,7 +84,7 @@ void drive(Bytes input, bool (*neutral)(Bytes)) {
     input = input.subspan(1 + size);
     static_cast<void>(driver.read());
     kerf::ServoOutput output;
-    output.motor_counts = {1000, -1000, 4000};  // which `motors_on` does not allow
+    output.dac_counts = {1000, -1000, 4000};  // which `motors_on` does not allow
     driver.command(output);
     driver.release();
   }

@@ -153,10 +153,11 @@ void check(const kerf::ServoOutput& out, double limit_n) {
   const auto finite = [](std::span<const double> values) {
     return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
   };
-  require(finite(out.position_mm) && finite(out.velocity_mm_per_s) && finite(out.force_n) &&
-          finite(out.contact_n) && finite(out.torque_n_mm) && finite(out.proxy_offset_mm) &&
-          finite(out.tip_torque_n_mm) && std::isfinite(out.absorbed_mj));
-  const auto& f = out.force_n;
+  require(finite(out.position_mm) && finite(out.velocity_mm_per_s) &&
+          finite(out.commanded_force_n) && finite(out.contact_force_n) && finite(out.torque_n_mm) &&
+          finite(out.proxy_offset_mm) && finite(out.tip_torque_n_mm) &&
+          std::isfinite(out.absorbed_mj));
+  const auto& f = out.commanded_force_n;
   require(f[0] * f[0] + f[1] * f[1] + f[2] * f[2] <= limit_n * limit_n);
   const auto& r = out.rotation;
   for (std::size_t a = 0; a < 9; a += 3) {

@@ -27,8 +27,8 @@ class GoldenHash {
     add_all(out.position_mm);
     add_all(out.rotation);
     add_all(out.velocity_mm_per_s);
-    add_all(out.force_n);
-    add_all(out.contact_n);
+    add_all(out.commanded_force_n);
+    add_all(out.contact_force_n);
     add_all(out.modification_n);
     add_all(out.torque_n_mm);
     add(out.absorbed_mj);

@@ -120,7 +120,7 @@ inline SunkForce sink(CuttingHand& miller, double x_mm = 0, double z_mm = 0) {
   std::array<double, 3> last_mm{};
   for (int ms = 0; ms < kMs; ++ms) {
     const ServoOutput out = miller.step({x_mm, kSinkFromMm - 0.005 * std::min(ms, kSinkMs), z_mm});
-    const double force_n = length(out.force_n);
+    const double force_n = length(out.commanded_force_n);
     if (ms >= kFeltMs) {
       sum_n += force_n;
       if (out.position_mm == last_mm) largest_n = std::max(largest_n, std::abs(force_n - last_n));

@@ -77,9 +77,10 @@ TEST_CASE("both forces of the first cutting tick are double's within 1.7e-4 of f
       });
       pair.step(0.11, y, -0.07);
       CAPTURE(y);
-      CHECK(pair.exact.contact_n[1] > 0.01);
+      CHECK(pair.exact.contact_force_n[1] > 0.01);
       CHECK(pair.exact.modification_n[1] > 0.005);
-      CHECK(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 1.7e-4 * kFullScaleN);
+      CHECK(worst_difference_n(pair.fixed.contact_force_n, pair.exact.contact_force_n) <
+            1.7e-4 * kFullScaleN);
       CHECK(worst_difference_n(pair.fixed.modification_n, pair.exact.modification_n) <
             1.7e-4 * kFullScaleN);
       CHECK(double(pair.fixed.removed_steps) ==
@@ -99,9 +100,10 @@ TEST_CASE("tools of both methods feel what the other has cut") {
   for (int i = 0; i < 400; ++i) {
     if (i % 50 == 0) pair.select(static_cast<std::uint32_t>(i / 50 % 2));
     pair.step(0.6 * std::sin(i * 0.05), 0.55, 0.3 * std::cos(i * 0.05));
-    deepest_n = std::max(deepest_n, std::abs(pair.exact.contact_n[1]));
+    deepest_n = std::max(deepest_n, std::abs(pair.exact.contact_force_n[1]));
     // Removal rounds to whole steps, and its carry moves fractions between voxels.
-    REQUIRE(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 4e-4 * kFullScaleN);
+    REQUIRE(worst_difference_n(pair.fixed.contact_force_n, pair.exact.contact_force_n) <
+            4e-4 * kFullScaleN);
   }
   CHECK(deepest_n > 0.1 * kFullScaleN);
 }
@@ -115,11 +117,12 @@ TEST_CASE("two volumes of different spacing each get their own method") {
   });
   for (int i = 0; i < 50; ++i) {
     pair.step(0.2, 0.6, 0.01 * i);
-    REQUIRE(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 4e-4 * kFullScaleN);
+    REQUIRE(worst_difference_n(pair.fixed.contact_force_n, pair.exact.contact_force_n) <
+            4e-4 * kFullScaleN);
     REQUIRE(worst_difference_n(pair.fixed.modification_n, pair.exact.modification_n) <
             4e-4 * kFullScaleN);
   }
-  CHECK(pair.exact.contact_n[1] > 0.01);
+  CHECK(pair.exact.contact_force_n[1] > 0.01);
 }
 
 TEST_CASE("a tool that does not turn runs aligned in a standing volume, and ignores the stylus") {
@@ -144,8 +147,9 @@ TEST_CASE("a tool that does not turn runs aligned in a standing volume, and igno
     double deepest_n = 0;
     for (int i = 0; i < 40; ++i) {
       pair.step(0.3, 0.2, 0.5 - 0.02 * i);
-      deepest_n = std::max(deepest_n, std::abs(pair.exact.contact_n[2]));
-      REQUIRE(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 4e-4 * kFullScaleN);
+      deepest_n = std::max(deepest_n, std::abs(pair.exact.contact_force_n[2]));
+      REQUIRE(worst_difference_n(pair.fixed.contact_force_n, pair.exact.contact_force_n) <
+              4e-4 * kFullScaleN);
       REQUIRE(worst_difference_n(pair.fixed.modification_n, pair.exact.modification_n) <
               4e-4 * kFullScaleN);
     }

@@ -247,12 +247,12 @@ TEST_CASE("after a stall the force of each arm begins at nothing") {
     Bench bench(two_armed(kind));
     bench.dock();
     for (int tick = 0; tick < 400; ++tick) bench.step(stroke(tick), stroke(tick));
-    for (const ServoOutput& out : bench.out) REQUIRE(length(out.force_n) > 0.08);
+    for (const ServoOutput& out : bench.out) REQUIRE(length(out.commanded_force_n) > 0.08);
     REQUIRE(bench.servo->apply({.kind = ServoCommand::Kind::fade_in}));
     for (int tick = 1; tick <= 100; ++tick) {
       bench.step(stroke(400), stroke(400));
       for (const ServoOutput& out : bench.out) {
-        REQUIRE(length(out.force_n) <= 3.3 * tick / 100);
+        REQUIRE(length(out.commanded_force_n) <= 3.3 * tick / 100);
         REQUIRE(out.phase == (tick < 100 ? Phase::ramping : Phase::active));
       }
     }

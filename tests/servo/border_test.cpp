@@ -70,7 +70,7 @@ TEST_CASE("on a solid that ends at the volume's border a tool rests, slides and 
         CuttingHand hand(scene, {0, kAboveMm, 0});
         const double bottom_mm = scene.tools[0].round ? kRadiusMm : 0;
         const ServoOutput rests = press(hand, rate_hz, 0.1);
-        CHECK(length(rests.force_n) > 0.1);
+        CHECK(length(rests.commanded_force_n) > 0.1);
         if (bottom_mm > 0) {
           CHECK(std::abs(proxy_mm(rests, 1) - kFaceMm - bottom_mm) < 0.1 * kVoxelMm);
         }
@@ -87,7 +87,8 @@ TEST_CASE("on a solid that ends at the volume's border a tool rests, slides and 
         const ServoOutput cut = press(cuts, rate_hz, 0.5);
         CHECK(cuts.removed_mm3() > 0.1);
         // What a tick is fed it removes, or the next one.
-        const double tick_mm3 = scene.cut.machinability_mm3_per_s_n * length(cut.force_n) / rate_hz;
+        const double tick_mm3 =
+            scene.cut.machinability_mm3_per_s_n * length(cut.commanded_force_n) / rate_hz;
         const double left_mm3 = cuts.fed_mm3() - cuts.removed_mm3();
         CHECK(left_mm3 > -0.01 * tick_mm3);
         CHECK(left_mm3 < tick_mm3);

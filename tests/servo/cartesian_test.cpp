@@ -95,9 +95,9 @@ TEST_CASE("the tip is what the device reports, and its force comes out in mN alo
       CHECK(out.motors_on);
       const double y = out.position_mm[1] - arm.scene.device.offset_mm[1];
       CHECK(y == doctest::Approx(-2).epsilon(0.001));
-      CHECK(out.force_n[1] > 0.9);  // 0.4 N/mm over the 3 mm of ball and press
+      CHECK(out.commanded_force_n[1] > 0.9);  // 0.4 N/mm over the 3 mm of ball and press
       for (std::size_t i = 0; i < 3; ++i) {
-        CHECK(std::abs(out.motor_counts[i] - out.force_n[i] * 1000) <= 0.51);
+        CHECK(std::abs(out.dac_counts[i] - out.commanded_force_n[i] * 1000) <= 0.51);
       }
     }
   }
@@ -110,9 +110,9 @@ TEST_CASE("a Cartesian device gives its own peak, and no more") {
     for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
       Arm arm(personality, numeric, peak_n);
       const ServoOutput out = arm.press(-40, 400);
-      CHECK(length(out.force_n) <= peak_n);
-      CHECK(length(out.force_n) > (personality == Personality::omega ? 11.9 : 9.0));
-      CHECK(std::ranges::max(out.motor_counts) <= peak_n * 1000);
+      CHECK(length(out.commanded_force_n) <= peak_n);
+      CHECK(length(out.commanded_force_n) > (personality == Personality::omega ? 11.9 : 9.0));
+      CHECK(std::ranges::max(out.dac_counts) <= peak_n * 1000);
     }
   }
 }

@@ -107,7 +107,8 @@ TEST_CASE("friction pulls against a bur that turns clockwise, by its part of the
   CHECK(friction_n > 0.25 * out.press_n);
   CHECK(friction_n < 0.5 * out.press_n);
   CHECK(length(out.modification_n) < 1.05 * friction_n);
-  CHECK(std::abs(out.force_n[1] - out.press_n) < 0.05 * out.press_n);  // friction does not press
+  CHECK(std::abs(out.commanded_force_n[1] - out.press_n) <
+        0.05 * out.press_n);  // friction does not press
 }
 
 TEST_CASE("friction does not press a ball in its own bore") {
@@ -119,7 +120,8 @@ TEST_CASE("friction does not press a ball in its own bore") {
   for (int ms = 0; ms < 1000; ++ms) {
     const double turn = 0.005 * ms;
     const ServoOutput out = miller.step({0.4 * std::sin(turn), -1, 0.4 * std::cos(turn)});
-    const double along_load_n = along(out.modification_n, out.contact_n) / length(out.contact_n);
+    const double along_load_n =
+        along(out.modification_n, out.contact_force_n) / length(out.contact_force_n);
     pressed = std::max(pressed, std::abs(along_load_n) / out.press_n);
     largest = std::max(largest, length(out.modification_n) / out.press_n);
   }
@@ -230,14 +232,15 @@ TEST_CASE("a thin wall gives way to cutting alone, and without a blow") {
     ServoOutput out;
     for (int ms = 0; ms < 1500; ++ms) {
       out = miller.step({0, std::max(-1.5, 1.2 - 0.01 * ms), 0});
-      const std::array<double, 3> step_n{out.force_n[0] - last_n[0], out.force_n[1] - last_n[1],
-                                         out.force_n[2] - last_n[2]};
+      const std::array<double, 3> step_n{out.commanded_force_n[0] - last_n[0],
+                                         out.commanded_force_n[1] - last_n[1],
+                                         out.commanded_force_n[2] - last_n[2]};
       worst_n = std::max(worst_n, length(step_n));
-      last_n = out.force_n;
+      last_n = out.commanded_force_n;
     }
     const double tool_mm = out.position_mm[1] + out.proxy_offset_mm[1];
     CHECK((tool_mm < -1) == turns);  // through, or still on the upper face
-    CHECK((length(out.force_n) < 0.2) == turns);
+    CHECK((length(out.commanded_force_n) < 0.2) == turns);
     CHECK(worst_n <= scene.limits.slew_n_per_ms + 1e-3);
   }
 }
@@ -249,9 +252,9 @@ TEST_CASE("a tool that leaves its groove is not held back") {
   miller.hold({0, 0.2, 0}, 0.5);
   for (int ms = 0; ms < 150; ++ms) {
     const ServoOutput out = miller.step({0, 0.2 + 0.02 * ms, 0});
-    CHECK(out.contact_n[1] >= 0);
-    CHECK(out.force_n[1] > -0.01);
-    if (ms > 60) CHECK(length(out.force_n) < 0.01);
+    CHECK(out.contact_force_n[1] >= 0);
+    CHECK(out.commanded_force_n[1] > -0.01);
+    if (ms > 60) CHECK(length(out.commanded_force_n) < 0.01);
   }
 }
 
@@ -319,14 +322,14 @@ TEST_CASE(
     scene.spindle.stall_torque_n_mm = 1000;  // it never slows down
     scene.limits.continuous_force_n = scene.limits.force_n;
     CuttingHand miller(scene, {0, 1.3, 0});
-    const double start_n = length(miller.hold({0, -1, 0}, 0.05).force_n);  // of x0 = 2 mm
+    const double start_n = length(miller.hold({0, -1, 0}, 0.05).commanded_force_n);  // of x0 = 2 mm
     const auto force_after = [&](int voxels) { return start_n - voxels * kStiffness * kVoxelMm; };
     struct Moment {
       double s = 0, removed_mm3 = 0;
     };
     Moment first, last;
     for (int ms = 1; ms < 30'000 && last.s == 0; ++ms) {
-      const double force_n = length(miller.step({0, -1, 0}).force_n);
+      const double force_n = length(miller.step({0, -1, 0}).commanded_force_n);
       const Moment now{0.001 * ms, miller.removed_mm3()};
       if (first.s == 0 && force_n <= force_after(1)) first = now;
       if (force_n <= force_after(1 + kVoxels)) last = now;

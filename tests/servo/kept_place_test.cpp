@@ -48,12 +48,12 @@ double force_after(NumericKind numeric, int rate_hz,
   ArmedServo armed(scene, kAround, std::max(1, rate_hz / 1000));
   lead(armed, kAround, {0, 3, 0});
   lead(armed, {0, 3, 0}, {0, kBehindMm, 0});
-  REQUIRE(armed.settled(0, kBehindMm, 0).force_n[1] > 1.2);
+  REQUIRE(armed.settled(0, kBehindMm, 0).commanded_force_n[1] > 1.2);
   disturb(armed);
   ServoOutput out;
   for (int tick = 0; tick < rate_hz * 3 / 10; ++tick) out = armed.step(0, kBehindMm, 0);
   CHECK(out.position_mm[1] + out.proxy_offset_mm[1] > 0);  // on its side of the wall
-  return out.force_n[1];
+  return out.commanded_force_n[1];
 }
 
 ServoCommand select(std::uint32_t tool) {
@@ -81,7 +81,7 @@ TEST_CASE("behind a wall the force survives commands, holds and glitches, on its
       CHECK(after([](ArmedServo& armed) {
               armed.servo->apply(hold(true));
               for (int tick = 0; tick < 30; ++tick) {
-                CHECK(armed.step(0, kBehindMm, 0).contact_n[1] == 0);
+                CHECK(armed.step(0, kBehindMm, 0).contact_force_n[1] == 0);
               }
               armed.servo->apply(hold(false));
             }) == same);

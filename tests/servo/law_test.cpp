@@ -179,12 +179,13 @@ TEST_CASE("a spring as a law of its own is the coupling without its damper, bit 
       const double y_mm = 1.2 - tick * 0.005;
       const ServoOutput out = a.step(0.1, y_mm, 0.2), own = b.step(0.1, y_mm, 0.2);
       for (std::size_t i = 0; i < 3; ++i) {
-        REQUIRE(std::abs(out.contact_n[i] - own.contact_n[i]) < 1e-4);  // each rounds its own way
+        REQUIRE(std::abs(out.contact_force_n[i] - own.contact_force_n[i]) <
+                1e-4);  // each rounds its own way
       }
     }
     CHECK(seen.spring_mm[1] > 0.5);
     CHECK(seen.normal[1] == doctest::Approx(1).epsilon(1e-3));
-    CHECK(length(b.settled(0.1, 3, 0.2).force_n) == 0);
+    CHECK(length(b.settled(0.1, 3, 0.2).commanded_force_n) == 0);
     CHECK(seen.spring_mm == std::array<double, 3>{});
     CHECK(seen.normal == std::array<double, 3>{});
   }
@@ -204,9 +205,9 @@ TEST_CASE(
       const ServoOutput out = servo->step(arm.at(0, 5, 0));
       CHECK(out.fault == fault);
       CHECK_FALSE(out.motors_on);
-      CHECK(out.force_n == std::array<double, 3>{});
-      CHECK(out.contact_n == std::array<double, 3>{});
-      CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
+      CHECK(out.commanded_force_n == std::array<double, 3>{});
+      CHECK(out.contact_force_n == std::array<double, 3>{});
+      CHECK(out.dac_counts == std::array<std::int16_t, 3>{});
     }
   }
 }
@@ -223,7 +224,7 @@ TEST_CASE("what the overlap removes in the tick in which a law fails is counted,
   static_cast<void>(armed.settled(0, 1.2, 0));
   const ServoOutput out = armed.step(0, 0.6, 0);
   REQUIRE(out.fault == Fault::force_law);
-  CHECK(length(out.contact_n) == 0);  // of what the law gave nothing is told
+  CHECK(length(out.contact_force_n) == 0);  // of what the law gave nothing is told
   CHECK(length(out.proxy_offset_mm) == 0);
   CHECK(armed.servo->penetration_mm() == 0);
   std::uint64_t gone = 0;
@@ -270,9 +271,9 @@ TEST_CASE("whatever a stabiliser gives, peak, slope and budget of the motors hol
       LoadedScene scene = with_stabiliser(numeric, push_n, 0);
       scene.limits.force_n = 2;
       ArmedServo armed(scene);
-      double last_n = length(armed.step(0, 5, 0).force_n), most_n = 0;
+      double last_n = length(armed.step(0, 5, 0).commanded_force_n), most_n = 0;
       for (int tick = 0; tick < 30000; ++tick) {
-        const double now_n = length(armed.step(0, 5, 0).force_n);
+        const double now_n = length(armed.step(0, 5, 0).commanded_force_n);
         REQUIRE(now_n <= 2);
         REQUIRE(now_n <= last_n + 0.5 + 1e-4);
         last_n = now_n;
@@ -292,7 +293,7 @@ TEST_CASE("a limit that acted is told, and what a stabiliser did is none") {
       return armed.settled(0, 5, 0);  // in the air
     };
     const ServoOutput within = settled(0.05), beyond = settled(5);
-    CHECK(length(within.force_n) == doctest::Approx(0.05).epsilon(1e-3));
+    CHECK(length(within.commanded_force_n) == doctest::Approx(0.05).epsilon(1e-3));
     CHECK_FALSE(within.clamped);
     CHECK(beyond.clamped);
   }

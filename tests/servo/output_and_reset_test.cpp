@@ -54,7 +54,7 @@ TEST_CASE("a tool that finds no free place is told, and feels nothing until it h
   ArmedServo armed(scene, {inkwell.x, inkwell.y + 1, inkwell.z});
   const ServoOutput inside = armed.settled(inkwell.x, inkwell.y + 1, inkwell.z);
   CHECK(inside.refused);
-  CHECK(length(inside.contact_n) == 0);
+  CHECK(length(inside.contact_force_n) == 0);
   double up_mm = 1;
   for (; up_mm < 16; up_mm += 0.05) {
     static_cast<void>(armed.step(inkwell.x, inkwell.y + up_mm, inkwell.z));

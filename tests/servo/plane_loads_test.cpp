@@ -67,8 +67,8 @@ TEST_CASE("the planes' loads make the force, and their moments its torque") {
           force = sum_of(force, load_n, normal);
           torque = sum_of(torque, load_n, cross(lever_mm, normal));
         }
-        const double force_n = length(out.contact_n);
-        CHECK(length(sum_of(force, -1, out.contact_n)) < 0.01 * force_n);
+        const double force_n = length(out.contact_force_n);
+        CHECK(length(sum_of(force, -1, out.contact_force_n)) < 0.01 * force_n);
         CHECK(length(sum_of(torque, -1, out.tip_torque_n_mm)) < 0.01 * force_n);
       }
     }
@@ -85,7 +85,7 @@ TEST_CASE("the friction of cutting turns the tool by its moment about the centre
     const ServoOutput out = miller.hold({0, 0.2, 0}, 0.1);
     REQUIRE(length(out.modification_n) > 0.05);
     REQUIRE(out.plane_count == 1);
-    CHECK(out.planes[0].load_n == doctest::Approx(length(out.contact_n)).epsilon(0.02));
+    CHECK(out.planes[0].load_n == doctest::Approx(length(out.contact_force_n)).epsilon(0.02));
     // The ball rests on its lowest point.
     const Point moment = cross({0, -kRadiusMm, 0}, out.modification_n);
     CHECK(length(moment) > 0.05);

@@ -52,10 +52,11 @@ HandOnFlat push_on_flat(LoadedScene scene) {
   const double step_s = 1.0 / scene.servo.rate_hz / kSubSteps;
   for (int tick = 0; tick < kTicks; ++tick) {
     hand.last = armed.step(0, std::clamp(y_mm, -20.0, 60.0), 0);
-    hand.peak_n = std::max(hand.peak_n, length(hand.last.force_n));
+    hand.peak_n = std::max(hand.peak_n, length(hand.last.commanded_force_n));
     hand.deepest_mm = std::max(hand.deepest_mm, length(hand.last.proxy_offset_mm));
     for (int i = 0; i < kSubSteps; ++i) {
-      const double force_n = hand.last.force_n[1] - kPushN - kDampingNsPerM * v_mm_per_s / 1000;
+      const double force_n =
+          hand.last.commanded_force_n[1] - kPushN - kDampingNsPerM * v_mm_per_s / 1000;
       v_mm_per_s += force_n / kMassKg * 1000 * step_s;
       y_mm += v_mm_per_s * step_s;
     }
@@ -90,7 +91,7 @@ TEST_CASE("pressing, rubbing and leaving: each source has its own account, and a
 
     ServoOutput rubbed;
     for (int i = 0; i <= 200; ++i) rubbed = armed.step(0.01 * i, 0.5, 0);
-    const double rubbed_n = 0.3 * std::abs(rubbed.force_n[1]);
+    const double rubbed_n = 0.3 * std::abs(rubbed.commanded_force_n[1]);
     // Once it slips, friction takes mu F along the way; before, it stores.
     CHECK(mj(rubbed, pressed, EnergySource::friction) ==
           doctest::Approx(rubbed_n * 2).epsilon(0.2));
@@ -117,10 +118,10 @@ TEST_CASE("lost reports: the spring keeps its store, and what holding and fading
       scene.force.damping_ns_per_mm = 0;
       ArmedServo armed(scene);
       const ServoOutput before = armed.settled(0, 0.4, 0);
-      double sent_n = before.force_n[1];
+      double sent_n = before.commanded_force_n[1];
       for (int i = 0; i < lost; ++i) {
         const ServoOutput out = armed.servo->step({});
-        sent_n += out.force_n[1];
+        sent_n += out.commanded_force_n[1];
         CHECK(out.energy_steps == before.energy_steps);  // nobody knows where the hand is
       }
       const ServoOutput after = armed.step(0, 0.2, 0);
@@ -149,8 +150,8 @@ TEST_CASE("a silence of seconds books the mean of the forces over all of its tic
       scene.servo.numeric = numeric;
       ArmedServo armed(scene);
       const ServoOutput before = armed.settled(0, 0.4, 0);
-      double sent_n = before.force_n[1];
-      for (int i = 0; i < lost; ++i) sent_n += armed.servo->step({}).force_n[1];
+      double sent_n = before.commanded_force_n[1];
+      for (int i = 0; i < lost; ++i) sent_n += armed.servo->step({}).commanded_force_n[1];
       const ServoOutput after = armed.step(0, 0.2, 0);
       const double moved_mm = before.position_mm[1] - after.position_mm[1];
       const double step_n = numeric == NumericKind::fixed ? 2e-5 : 1e-9;
@@ -165,7 +166,7 @@ TEST_CASE("what limits, fading in and cutting do has an account") {
   ArmedServo armed(scene);
   ServoOutput deep;
   for (int i = 0; i <= 500; ++i) deep = armed.step(0, 1.2 - 0.025 * i, 0);
-  REQUIRE(length(deep.force_n) == doctest::Approx(3.3).epsilon(0.01));
+  REQUIRE(length(deep.commanded_force_n) == doctest::Approx(3.3).epsilon(0.01));
   CHECK(mj(deep, EnergySource::limits) < -1);  // the spring was never felt whole
   CHECK(mj(deep, EnergySource::hold) == 0);
   armed.servo->apply({.kind = ServoCommand::Kind::fade_in});

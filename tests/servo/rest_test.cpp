@@ -120,11 +120,11 @@ TEST_CASE("pressing on the tooth, the sign of parking for 60 ms: a fault, and th
     for (int tick = 0; tick < 60; ++tick) static_cast<void>(armed.servo->step(false_dock));
     const ServoOutput after = armed.settled(0, 0.3, 0);
     CHECK(after.position_mm == before.position_mm);
-    CHECK(after.joint_counts == before.joint_counts);
+    CHECK(after.encoder_counts == before.encoder_counts);
     CHECK(after.fault == Fault::wrong_dock);
     CHECK_FALSE(after.motors_on);
     arm_at(*armed.servo, armed.arm, 0, 5, 0);  // the true dock
-    CHECK(vec3::length(armed.settled(0, 0.3, 0).force_n) > 0.1);
+    CHECK(vec3::length(armed.settled(0, 0.3, 0).commanded_force_n) > 0.1);
   }
 }
 

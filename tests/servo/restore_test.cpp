@@ -175,8 +175,8 @@ TEST_CASE("after a reset or an undo the tool feels and cuts as if nothing had be
       for (int ms = 0; ms < 300; ++ms) {
         const Place at{0, 2 - 0.008 * ms, 0};
         const ServoOutput before = fresh.step_to(at), after = restored.step_to(at);
-        most_n = std::max(most_n, length(before.contact_n));
-        REQUIRE(before.contact_n == after.contact_n);
+        most_n = std::max(most_n, length(before.contact_force_n));
+        REQUIRE(before.contact_force_n == after.contact_force_n);
         REQUIRE(before.removed_steps == after.removed_steps);
       }
       CHECK(most_n > 0.1);
@@ -219,7 +219,7 @@ TEST_CASE("no force is felt and nothing is cut while volumes are restored, whoev
       std::uint64_t last = 0;  // a tool that lies in the solid cuts in the next tick again
       for (ServoOutput out; (out = once.step_to(kGrooveEnd)).resetting || out.undoing;) {
         last = once.hash();
-        CHECK(length(out.contact_n) == 0);
+        CHECK(length(out.contact_force_n) == 0);
         CHECK(out.removed_steps == 0);
         CHECK(out.press_n == 0);
         CHECK(often.step_to(kGrooveEnd).output_hash == out.output_hash);
@@ -248,18 +248,20 @@ TEST_CASE("inside of the restored solid the force comes slowly, and a hand at re
       double after_ms = 0;
       for (int ms = 0; ms < 1500; ++ms) {
         const ServoOutput out = hand.rest(kGrooveEnd, 1);
-        CHECK(length(vec3::operator-(out.force_n, last.force_n)) <= kSlewN);
-        CHECK(length(out.force_n) <= 2.01);
+        CHECK(length(vec3::operator-(out.commanded_force_n, last.commanded_force_n)) <= kSlewN);
+        CHECK(length(out.commanded_force_n) <= 2.01);
         after_ms = out.resetting || out.undoing ? 0 : after_ms + 1;
         // It fades in over 100 ms, and a spring that ramps grows by 0.1 N/ms at most.
-        if (after_ms > 0 && after_ms < 20) CHECK(length(out.force_n) < 0.02 * after_ms + 0.02);
+        if (after_ms > 0 && after_ms < 20)
+          CHECK(length(out.commanded_force_n) < 0.02 * after_ms + 0.02);
         CHECK(out.absorbed_mj == doctest::Approx(work_mj));  // at rest
         const auto& energy = out.energy_steps;
         const auto steps = std::accumulate(energy.begin(), energy.end(), std::int64_t{0});
         CHECK(std::abs(energy_mj_of_steps(steps) - out.absorbed_mj) < 1e-6);
         last = out;
       }
-      if (kind.cut == CutModel::preston) CHECK(last.force_n[1] > 0.2);  // it is pushed out again
+      if (kind.cut == CutModel::preston)
+        CHECK(last.commanded_force_n[1] > 0.2);  // it is pushed out again
     }
   }
 }
@@ -463,7 +465,7 @@ TEST_CASE("without the pedal nothing is cut, however the tool came to press") {
     CHECK(up.pedalled);
     CHECK(up.spindle_ratio == 0);
     CHECK(length(up.modification_n) == 0);
-    CHECK(length(up.contact_n) > 0.01);  // it is felt all the same
+    CHECK(length(up.contact_force_n) > 0.01);  // it is felt all the same
     CHECK_FALSE(up.undoable);
     hand.pedal = true;
     hand.rest(kGrooveEnd, 500);
@@ -543,7 +545,7 @@ TEST_CASE("a reset goes on through a fault, through missing reports and through 
       if (disturbance == 0) out = hand.servo->step({});
       if (disturbance == 1) out = hand.step(0, tick == 0 ? 40 : 41, 40);
       if (disturbance >= 2) out = hand.rest(kGrooveEnd, 1);
-      if (tick > 30) CHECK(length(out.force_n) == 0);
+      if (tick > 30) CHECK(length(out.commanded_force_n) == 0);
     }
     CHECK_FALSE(out.resetting);
     CHECK(hand.hash() == hand.first);
@@ -551,7 +553,7 @@ TEST_CASE("a reset goes on through a fault, through missing reports and through 
     CHECK(out.fault == faults[static_cast<std::size_t>(disturbance)]);
     if (disturbance != 2) continue;
     hand.servo->apply({ServoCommand::Kind::hold, 0});
-    CHECK(length(hand.rest(kGrooveEnd, 500).force_n) > 0.2);
+    CHECK(length(hand.rest(kGrooveEnd, 500).commanded_force_n) > 0.2);
   }
 }
 

@@ -165,7 +165,8 @@ void check_all(const LoadedScene& scene) {
         CAPTURE(arm);
         const TickRecord a = published(fresh, fresh_before, arm);
         const TickRecord b = published(again, again_before, arm);
-        REQUIRE(length(again.out[arm].force_n) == length(fresh.out[arm].force_n));
+        REQUIRE(length(again.out[arm].commanded_force_n) ==
+                length(fresh.out[arm].commanded_force_n));
         REQUIRE(std::memcmp(&a, &b, sizeof a) == 0);
         REQUIRE(again.out[arm].changed == fresh.out[arm].changed);
         REQUIRE(again.out[arm].samples_read == fresh.out[arm].samples_read);
@@ -217,7 +218,7 @@ TEST_CASE("after a stall nothing of the force before it comes back, though repor
         bench.step({.silent = true}, {.silent = true});
         for (const ServoOutput& out : bench.out) {
           REQUIRE(out.motors_on);
-          REQUIRE(length(out.force_n) == 0);
+          REQUIRE(length(out.commanded_force_n) == 0);
         }
       }
       // Nor does the motion meanwhile count as work of that force.
@@ -256,23 +257,23 @@ TEST_CASE("a hold leaves no trace: the force comes back as to a hand that never 
       for (int tick = 0; tick < 300; ++tick) {
         pressed.step(stroke(from), stroke(from));
         came.step(stroke(from), stroke(from));
-        for (const ServoOutput& out : pressed.out) REQUIRE(length(out.force_n) <= 0.51);
+        for (const ServoOutput& out : pressed.out) REQUIRE(length(out.commanded_force_n) <= 0.51);
       }
       hold(0);
       for (int tick = 0; tick < 200; ++tick) {
         pressed.step(stroke(from + tick), stroke(from + tick));
         came.step(stroke(from + tick), stroke(from + tick));
         for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
-          REQUIRE(pressed.out[arm].force_n == came.out[arm].force_n);
+          REQUIRE(pressed.out[arm].commanded_force_n == came.out[arm].commanded_force_n);
           REQUIRE(pressed.out[arm].velocity_mm_per_s == came.out[arm].velocity_mm_per_s);
           // The spring of a proxy grows by 0.1 N a ms, from nothing on.
           if (kind.cut == CutModel::preston) {
-            REQUIRE(length(pressed.out[arm].contact_n) <= 0.1 * (tick + 1) + 0.02);
+            REQUIRE(length(pressed.out[arm].contact_force_n) <= 0.1 * (tick + 1) + 0.02);
           }
         }
       }
     }
-    CHECK(length(pressed.out[0].force_n) > 0.03);
+    CHECK(length(pressed.out[0].commanded_force_n) > 0.03);
   }
 }
 

@@ -21,23 +21,23 @@ using namespace kerf::test;
 TEST_CASE("reports stop: the force holds 5 ms, is zero at 20 ms, motors off, fault latched") {
   LoadedScene scene = half_space_scene();
   ArmedServo armed(scene);
-  const double held_n = length(armed.settled(0, 0.3, 0).force_n);
+  const double held_n = length(armed.settled(0, 0.3, 0).commanded_force_n);
   REQUIRE(held_n > 0.1);
   for (int ms = 1; ms <= 25; ++ms) {
     const ServoOutput out = armed.servo->step({});
     CAPTURE(ms);
-    if (ms <= 5) CHECK(length(out.force_n) == doctest::Approx(held_n).epsilon(1e-3));
-    if (ms > 5) CHECK(length(out.force_n) < held_n);
+    if (ms <= 5) CHECK(length(out.commanded_force_n) == doctest::Approx(held_n).epsilon(1e-3));
+    if (ms > 5) CHECK(length(out.commanded_force_n) < held_n);
     if (ms >= 20) {
-      CHECK(length(out.force_n) == 0);
+      CHECK(length(out.commanded_force_n) == 0);
       CHECK_FALSE(out.motors_on);
       CHECK(out.fault == Fault::stale_input);
-      CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
+      CHECK(out.dac_counts == std::array<std::int16_t, 3>{});
     }
   }
   CHECK(armed.settled(0, 0.3, 0).phase == Phase::fault);  // stays off
   arm_at(*armed.servo, armed.arm, 0, 5, 0);               // until docked again
-  CHECK(length(armed.settled(0, 0.3, 0).force_n) > 0.1);
+  CHECK(length(armed.settled(0, 0.3, 0).commanded_force_n) > 0.1);
 }
 
 TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a fault") {
@@ -49,7 +49,8 @@ TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a f
   CHECK_FALSE(armed.servo->step(glitch).motors_on);
   const ServoOutput after = armed.step(0, 0.3, 0);
   CHECK(after.position_mm == before.position_mm);
-  CHECK(length(after.force_n) < 0.1 * length(before.force_n));  // fades in again
+  CHECK(length(after.commanded_force_n) <
+        0.1 * length(before.commanded_force_n));  // fades in again
   for (int ms = 0; ms < 30; ++ms) static_cast<void>(armed.servo->step({}));
   glitch = armed.arm.at(0, 0.3, 0);
   glitch.parked = true;
@@ -72,11 +73,11 @@ TEST_CASE("after a stall the force starts again from nothing") {
   LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;
   ArmedServo armed(scene);
-  REQUIRE(length(armed.settled(0, 0.3, 0).force_n) > 3);
+  REQUIRE(length(armed.settled(0, 0.3, 0).commanded_force_n) > 3);
   armed.servo->apply({.kind = ServoCommand::Kind::fade_in});
   double last_n = 0;
   for (int tick = 0; tick < 20; ++tick) {
-    const double force_n = length(armed.step(0, 0.3, 0).force_n);
+    const double force_n = length(armed.step(0, 0.3, 0).commanded_force_n);
     CHECK(force_n <= last_n + 0.5 + 1e-4);
     CHECK(force_n <= 3.3 * (tick + 1) / 100 + 1e-4);  // however much the contact wants
     last_n = force_n;
@@ -95,7 +96,7 @@ void check_heat(const Step& step) {
   ArmedServo armed(scene);
   double heat_n2 = 0;
   for (int tick = 0; tick < 8000; ++tick) {
-    const double force_n = length(step(armed, tick).force_n);
+    const double force_n = length(step(armed, tick).commanded_force_n);
     heat_n2 += (force_n * force_n - heat_n2) / 10'000;
     CHECK(std::sqrt(heat_n2) <= scene.limits.continuous_force_n + 0.01);
   }
@@ -129,7 +130,8 @@ TEST_CASE("whatever noise the encoders have, the force changes by the slew or by
     ArmedServo armed(scene, {0, 1.1, 0}, std::max(1, rate_hz / 1000));
     constexpr double kDeepMm = -2;  // 3 mm into the solid
     std::array<double, 3> last{};
-    for (int i = 1; i <= 200; ++i) last = armed.step(0, 1 + (kDeepMm - 1) * i / 200, 0).force_n;
+    for (int i = 1; i <= 200; ++i)
+      last = armed.step(0, 1 + (kDeepMm - 1) * i / 200, 0).commanded_force_n;
     REQUIRE(length(last) > 1);
     std::uint32_t random = 1;
     const int most = rate_hz > 1000 ? 2 : 5;  // counts; more is faster than 10 m/s
@@ -143,10 +145,10 @@ TEST_CASE("whatever noise the encoders have, the force changes by the slew or by
       }
       const ServoOutput out = armed.servo->step(report);
       REQUIRE(out.fault == Fault::none);
-      const double change_n = length(vec3::operator-(out.force_n, last));
+      const double change_n = length(vec3::operator-(out.commanded_force_n, last));
       CHECK(change_n <= std::max(500.0 / rate_hz, length(last)) + 1e-4);
       steepest_n = std::max(steepest_n, change_n);
-      last = out.force_n;
+      last = out.commanded_force_n;
     }
     if (rate_hz >= 1000) CHECK(steepest_n > 500.0 / rate_hz);  // it fell at once, too
   }
@@ -158,7 +160,7 @@ TEST_CASE("a packet each 19 ms, for ever: a latched fault within 0.1 s, at any r
     LoadedScene scene = half_space_scene();
     scene.servo.rate_hz = rate_hz;
     ArmedServo armed(scene, {0, 1.1, 0}, std::max(1, rate_hz / 1000));
-    REQUIRE(length(armed.settled(0, 0.3, 0).force_n) > 0.1);
+    REQUIRE(length(armed.settled(0, 0.3, 0).commanded_force_n) > 0.1);
     const int period = 19 * rate_hz / 1000;
     ServoOutput out;
     for (int tick = 1; tick <= rate_hz / 10; ++tick) {
@@ -176,11 +178,11 @@ TEST_CASE("a force beyond the motors keeps its direction, and what was sent is w
   ArmedServo armed(scene);
   const ServoOutput out = armed.settled(0.2, 0.3, 0.2);
   CHECK(out.clamped);
-  CHECK(length(out.force_n) < 1);
+  CHECK(length(out.commanded_force_n) < 1);
   int largest = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    largest = std::max(largest, std::abs(int{out.motor_counts[i]}));
-    CHECK(out.motor_counts[i] * 0.01 == doctest::Approx(out.torque_n_mm[i]).epsilon(0.01));
+    largest = std::max(largest, std::abs(int{out.dac_counts[i]}));
+    CHECK(out.dac_counts[i] * 0.01 == doctest::Approx(out.torque_n_mm[i]).epsilon(0.01));
   }
   CHECK(largest == 2047);
 }
@@ -193,7 +195,7 @@ TEST_CASE("a force that is not finite ends the motors at once") {
   const ServoOutput out = armed.settled(0, 0.3, 0);
   CHECK(out.fault == Fault::not_finite);
   CHECK_FALSE(out.motors_on);
-  CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
+  CHECK(out.dac_counts == std::array<std::int16_t, 3>{});
 }
 
 TEST_CASE("a pose that is not finite: motors off after 2 ms, until the device was parked") {
@@ -238,7 +240,7 @@ TEST_CASE("faster than 10 m/s: motors off in the same tick") {
   const ServoOutput out = armed.step(0, 15.0, 0);
   CHECK(out.fault == Fault::overspeed);
   CHECK_FALSE(out.motors_on);
-  CHECK(length(out.force_n) == 0);
+  CHECK(length(out.commanded_force_n) == 0);
 }
 
 TEST_CASE("counters far beyond any joint leave a place in range, and docking forgets the jump") {
@@ -267,9 +269,9 @@ TEST_CASE("a scene without torque scale feels, but never turns the motors on") {
   scene.device.torque_scale.reset();
   ArmedServo armed(scene);
   const ServoOutput out = armed.settled(0, 0.3, 0);
-  CHECK(length(out.contact_n) > 0.1);
+  CHECK(length(out.contact_force_n) > 0.1);
   CHECK_FALSE(out.motors_on);
-  CHECK(length(out.force_n) == 0);
+  CHECK(length(out.commanded_force_n) == 0);
 }
 
 TEST_CASE("a very stiff scene meets every limit and keeps the force below 3.3 N") {
@@ -279,14 +281,16 @@ TEST_CASE("a very stiff scene meets every limit and keeps the force below 3.3 N"
   std::array<double, 3> last{};
   for (int tick = 0; tick < 200; ++tick) {
     const ServoOutput out = armed.step(0, tick < 100 ? 0.0 : 5.0, 0);
-    CHECK(length(out.force_n) <= 3.3);
+    CHECK(length(out.commanded_force_n) <= 3.3);
     // In the tick in which the hand leaves the force may fall along its own direction at once.
     const double square = vec3::dot(last, last);
-    const double kept =
-        tick == 100 && square > 0 ? std::clamp(vec3::dot(out.force_n, last) / square, 0.0, 1.0) : 1;
-    CHECK(length(vec3::operator-(out.force_n, vec3::operator*(kept, last))) <= 0.5 + 1e-4);
-    for (const auto counts : out.motor_counts) CHECK(std::abs(counts) <= 2047);
-    last = out.force_n;
+    const double kept = tick == 100 && square > 0
+                            ? std::clamp(vec3::dot(out.commanded_force_n, last) / square, 0.0, 1.0)
+                            : 1;
+    CHECK(length(vec3::operator-(out.commanded_force_n, vec3::operator*(kept, last))) <=
+          0.5 + 1e-4);
+    for (const auto counts : out.dac_counts) CHECK(std::abs(counts) <= 2047);
+    last = out.commanded_force_n;
   }
 }
 
@@ -326,7 +330,7 @@ TEST_CASE("whatever counters and pots read, the tool keeps its size and the forc
           worst = std::max(worst, std::abs(product - (a == b ? 1 : 0)));
         }
         REQUIRE(worst < 1e-5);
-        REQUIRE(length(out.force_n) <= scene.limits.force_n);
+        REQUIRE(length(out.commanded_force_n) <= scene.limits.force_n);
       }
     }
   }

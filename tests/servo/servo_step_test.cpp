@@ -29,9 +29,9 @@ TEST_CASE("a ball in a half-space pushes straight out with the theory's force") 
     for (const double y : {0.75, 0.5, 0.3}) {
       const ServoOutput out = armed.settled(0, y, 0);
       const double p_mm = 1.0 - out.position_mm[1];  // where the encoders put it
-      CHECK(out.force_n[1] == doctest::Approx(theory_n(p_mm)).epsilon(0.07));
-      CHECK(std::abs(out.force_n[0]) < 0.01 * out.force_n[1]);
-      CHECK(std::abs(out.force_n[2]) < 0.01 * out.force_n[1]);
+      CHECK(out.commanded_force_n[1] == doctest::Approx(theory_n(p_mm)).epsilon(0.07));
+      CHECK(std::abs(out.commanded_force_n[0]) < 0.01 * out.commanded_force_n[1]);
+      CHECK(std::abs(out.commanded_force_n[2]) < 0.01 * out.commanded_force_n[1]);
       CHECK(armed.servo->penetration_mm() == doctest::Approx(p_mm).epsilon(0.25));
       CHECK(out.motors_on);
     }
@@ -41,8 +41,8 @@ TEST_CASE("a ball in a half-space pushes straight out with the theory's force") 
 TEST_CASE("no force in the air, none when immersed") {
   LoadedScene scene = paper_scene();
   ArmedServo armed(scene);
-  CHECK(length(armed.settled(0, 2, 0).force_n) == 0);
-  CHECK(length(armed.settled(0, -2, 0).force_n) < 1e-4);
+  CHECK(length(armed.settled(0, 2, 0).commanded_force_n) == 0);
+  CHECK(length(armed.settled(0, -2, 0).commanded_force_n) < 1e-4);
 }
 
 TEST_CASE("workspace scale keeps power: F_device = s F_scene at x_scene = s x_device") {
@@ -54,8 +54,9 @@ TEST_CASE("workspace scale keeps power: F_device = s F_scene at x_scene = s x_de
   const ServoOutput at_one = one.settled(0, 0.6, 0);
   const ServoOutput at_half = half.settled(0, 1.2, 0);
   // The counts differ by up to one: compare each with the theory at its own place.
-  const double ratio_one = at_one.force_n[1] / theory_n(1 - at_one.position_mm[1]);
-  const double ratio_half = at_half.force_n[1] / (0.5 * theory_n(1 - at_half.position_mm[1]));
+  const double ratio_one = at_one.commanded_force_n[1] / theory_n(1 - at_one.position_mm[1]);
+  const double ratio_half =
+      at_half.commanded_force_n[1] / (0.5 * theory_n(1 - at_half.position_mm[1]));
   CHECK(ratio_half == doctest::Approx(ratio_one).epsilon(0.03));
 }
 
@@ -69,8 +70,8 @@ TEST_CASE("turning volume and approach together turns the force with them") {
   ArmedServo armed(scene, {5, 0, 0});
   const ServoOutput out = armed.settled(0.5, 0, 0);
   const double p_mm = 1.0 - out.position_mm[0];
-  CHECK(out.force_n[0] == doctest::Approx(theory_n(p_mm)).epsilon(0.07));
-  CHECK(std::abs(out.force_n[1]) < 0.01 * out.force_n[0]);
+  CHECK(out.commanded_force_n[0] == doctest::Approx(theory_n(p_mm)).epsilon(0.07));
+  CHECK(std::abs(out.commanded_force_n[1]) < 0.01 * out.commanded_force_n[0]);
 }
 
 TEST_CASE("two halves as two volumes push as one whole") {
@@ -81,8 +82,8 @@ TEST_CASE("two halves as two volumes push as one whole") {
   parts.volumes.push_back(parts.volumes[0]);
   ArmedServo one(whole);
   ArmedServo two(parts);
-  const double whole_n = one.settled(0, 0.5, 0).force_n[1];
-  CHECK(two.settled(0, 0.5, 0).force_n[1] == doctest::Approx(whole_n).epsilon(1e-3));
+  const double whole_n = one.settled(0, 0.5, 0).commanded_force_n[1];
+  CHECK(two.settled(0, 0.5, 0).commanded_force_n[1] == doctest::Approx(whole_n).epsilon(1e-3));
 }
 
 TEST_CASE("force comes from the volume before this tick's cut; both forces resist") {
@@ -94,12 +95,12 @@ TEST_CASE("force comes from the volume before this tick's cut; both forces resis
   ArmedServo mill(cut);
   const ServoOutput felt = feel.step(0, 0.5, 0);
   const ServoOutput first = mill.step(0, 0.5, 0);
-  CHECK(first.contact_n == felt.contact_n);
+  CHECK(first.contact_force_n == felt.contact_force_n);
   CHECK(first.removed_steps > 0);
   CHECK(first.modification_n[1] > 0.0);
   CHECK_FALSE(first.changed[0].empty());
   const ServoOutput second = mill.step(0, 0.5, 0);
-  CHECK(length(second.contact_n) < 0.7 * length(first.contact_n));
+  CHECK(length(second.contact_force_n) < 0.7 * length(first.contact_force_n));
 }
 
 TEST_CASE("what leaves the volume is what the output counts") {
@@ -131,11 +132,11 @@ TEST_CASE("the tool changes at a tick boundary, to a known index only") {
   LoadedScene scene = paper_scene();
   scene.tools.push_back(ball(10));
   ArmedServo armed(scene);
-  const double large_n = armed.settled(0, 0.4, 0).force_n[1];
+  const double large_n = armed.settled(0, 0.4, 0).commanded_force_n[1];
   armed.servo->apply({ServoCommand::Kind::select_tool, 1});
   const ServoOutput out = armed.settled(0, 0.4, 0);
   CHECK(out.active_tool == 1);
-  CHECK(out.force_n[1] < 0.8 * large_n);
+  CHECK(out.commanded_force_n[1] < 0.8 * large_n);
   armed.servo->apply({ServoCommand::Kind::select_tool, 2});
   CHECK(armed.settled(0, 0.4, 0).active_tool == 1);
 }
@@ -153,7 +154,7 @@ TEST_CASE("ten seconds of cutting never touch the heap") {
     const CountedAllocations counted;
     for (int tick = 0; tick < 10'000; ++tick) {
       const double angle = tick * 0.002;
-      sum_n += armed.step(std::cos(angle), 0.4, std::sin(angle)).force_n[1];
+      sum_n += armed.step(std::cos(angle), 0.4, std::sin(angle)).commanded_force_n[1];
     }
   }
   CHECK(sum_n > 0);

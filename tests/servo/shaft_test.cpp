@@ -57,11 +57,12 @@ TEST_CASE("what the shaft presses on is felt, told and never cut, in every kind 
       miller.hold({-0.3, 0, 0}, 0.05);  // in steps below the limit of speed
       const ServoOutput out = miller.hold({-1.3, 0, 0}, 0.3);
       const double depth_mm = 0.5 - out.position_mm[0];  // of the axis
-      CHECK(out.force_n[0] == doctest::Approx(0.4 * depth_mm).epsilon(0.02));
-      CHECK(std::hypot(out.force_n[1], out.force_n[2]) < 0.02 * out.force_n[0]);
+      CHECK(out.commanded_force_n[0] == doctest::Approx(0.4 * depth_mm).epsilon(0.02));
+      CHECK(std::hypot(out.commanded_force_n[1], out.commanded_force_n[2]) <
+            0.02 * out.commanded_force_n[0]);
       // At the ledge's middle, 2.5 above the tip.
       CHECK(out.tip_torque_n_mm[2] ==
-            doctest::Approx(-(2.5 - out.position_mm[1]) * out.force_n[0]).epsilon(0.03));
+            doctest::Approx(-(2.5 - out.position_mm[1]) * out.commanded_force_n[0]).epsilon(0.03));
       CHECK(out.shaft);
       CHECK(out.press_n == 0);
       CHECK(out.spindle_load == 0);
@@ -84,7 +85,8 @@ TEST_CASE("a handpiece behind the shaft is felt as the shaft is, in every kind o
     CHECK_FALSE(miller.hold({1, 0, 0}, 0.05).shaft);
     miller.hold({0, 0, 0}, 0.05);
     const ServoOutput out = miller.hold({-0.8, 0, 0}, 0.3);
-    CHECK(out.force_n[0] == doctest::Approx(0.4 * (0.8 - out.position_mm[0])).epsilon(0.02));
+    CHECK(out.commanded_force_n[0] ==
+          doctest::Approx(0.4 * (0.8 - out.position_mm[0])).epsilon(0.02));
     CHECK(out.shaft);
     CHECK(out.press_n == 0);
     CHECK(miller.removed_mm3() == 0);
@@ -101,7 +103,7 @@ TEST_CASE("the flag is set while the shaft bears more than 0.01 N, and at no oth
   int touching = 0;
   for (int tick = 0; tick < 400; ++tick) {
     const ServoOutput out = armed.step(1.5 - 1.6 * std::sin(0.02 * tick), 0, 0);
-    CHECK(out.shaft == (length(out.contact_n) > 0.01));  // nothing else is touched here
+    CHECK(out.shaft == (length(out.contact_force_n) > 0.01));  // nothing else is touched here
     touching += out.shaft ? 1 : 0;
   }
   CHECK(touching > 50);
@@ -119,8 +121,9 @@ TEST_CASE("a head that is pressed beside its shaft cuts by its own part of the f
     miller.hold({1, -0.9, 0}, 0.1);
     const ServoOutput out = miller.hold({-1.5, -2.2, 0}, 0.3);
     CHECK(out.shaft);
-    CHECK(out.force_n[0] == doctest::Approx(0.4 * (0.5 - out.position_mm[0])).epsilon(0.02));
-    CHECK(out.press_n == doctest::Approx(out.force_n[1]).epsilon(0.02));
+    CHECK(out.commanded_force_n[0] ==
+          doctest::Approx(0.4 * (0.5 - out.position_mm[0])).epsilon(0.02));
+    CHECK(out.press_n == doctest::Approx(out.commanded_force_n[1]).epsilon(0.02));
     CHECK(miller.removed_mm3() > 0.001);
     CHECK(miller.removed_mm3() == doctest::Approx(miller.fed_mm3()).epsilon(0.001));
   }
@@ -142,7 +145,7 @@ TEST_CASE("a ball that cuts its own bore is not held by its shaft, neither in no
       }
       CHECK(proxy_mm <= -2);
       for (int tick = 0; tick < 500; ++tick) {
-        REQUIRE(length(miller.step({0, -2 + 0.01 * tick, 0}).force_n) < 0.05);
+        REQUIRE(length(miller.step({0, -2 + 0.01 * tick, 0}).commanded_force_n) < 0.05);
       }
       return miller.removed_mm3();
     };
@@ -211,21 +214,21 @@ TEST_CASE("a shaft comes and goes with its tool, and is pushed out with a ramp")
     armed.settled(2, 0, 0);
     const ServoOutput held = armed.settled(-1.3, 0, 0);
     CHECK(held.shaft);
-    CHECK(held.force_n[0] > 0.6);
+    CHECK(held.commanded_force_n[0] > 0.6);
     for (int time = 0; time < 2; ++time) {
       CHECK(armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 1}));
       const ServoOutput bare = armed.settled(-1.3, 0, 0);
-      CHECK(length(bare.force_n) <
+      CHECK(length(bare.commanded_force_n) <
             1e-12);  // in double the proxy rests within a rounding of the hand
       CHECK_FALSE(bare.shaft);
       CHECK(armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 0}));
       double last_n = 0;
       for (int tick = 0; tick < 100; ++tick) {
         const ServoOutput out = armed.step(-1.3, 0, 0);
-        CHECK(length(out.contact_n) <= last_n + 0.1 + 1e-3);
-        last_n = length(out.contact_n);
+        CHECK(length(out.contact_force_n) <= last_n + 0.1 + 1e-3);
+        last_n = length(out.contact_force_n);
       }
-      CHECK(last_n == doctest::Approx(held.force_n[0]).epsilon(0.02));
+      CHECK(last_n == doctest::Approx(held.commanded_force_n[0]).epsilon(0.02));
     }
   }
 }
@@ -240,7 +243,7 @@ TEST_CASE("ticks with a shaft and a handpiece never touch the heap") {
   const auto before = CountedAllocations::total();
   double sum_n = 0;
   for (int tick = 0; tick < 500; ++tick) {
-    sum_n += length(miller.step({1 - 2 * std::sin(0.02 * tick), -1.5, 0}).force_n);
+    sum_n += length(miller.step({1 - 2 * std::sin(0.02 * tick), -1.5, 0}).commanded_force_n);
   }
   CHECK(sum_n > 1);
   CHECK(CountedAllocations::total() == before);

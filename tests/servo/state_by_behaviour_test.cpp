@@ -66,7 +66,7 @@ TEST_CASE("the heat of each arm is that of the force that was sent, and it cools
         }
         bench.step(hand, stroke(at + 40));
         for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
-          const double force_n = length(bench.out[arm].force_n);
+          const double force_n = length(bench.out[arm].commanded_force_n);
           expected_n2[arm] += (force_n * force_n - expected_n2[arm]) / 10'000;  // 10 s at 1 kHz
           CAPTURE(tick);
           CAPTURE(arm);
@@ -142,23 +142,23 @@ TEST_CASE("a tool that takes over stays on its side of a wall, and its force gro
     const ServoOutput& out = bench.out[0];
     for (int tick = 0; tick < 150; ++tick) bench.step({.at = {0, 5 - 0.05 * tick, 0}});
     for (int tick = 0; tick < 20; ++tick) bench.step(below);
-    REQUIRE(out.contact_n[1] > 0.5);
+    REQUIRE(out.contact_force_n[1] > 0.5);
     for (const std::uint32_t tool : {1U, 2U, 3U, 0U, 2U, 1U, 0U}) {
       CAPTURE(tool);
       REQUIRE(bench.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = tool}));
       for (int tick = 0; tick < 200; ++tick) {
         CAPTURE(tick);
         bench.step(below);
-        REQUIRE(length(out.contact_n) <= 0.1 * tick + 0.05);  // 0.1 N a ms, from nothing on
+        REQUIRE(length(out.contact_force_n) <= 0.1 * tick + 0.05);  // 0.1 N a ms, from nothing on
       }
       CHECK(out.active_tool == tool);
-      CHECK(out.contact_n[1] > 0.5);
+      CHECK(out.contact_force_n[1] > 0.5);
     }
     // The tool that is used already changes nothing.
-    const double before_n = length(out.contact_n);
+    const double before_n = length(out.contact_force_n);
     REQUIRE(bench.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 0}));
     bench.step(below);
-    CHECK(length(out.contact_n) == doctest::Approx(before_n).epsilon(0.01));
+    CHECK(length(out.contact_force_n) == doctest::Approx(before_n).epsilon(0.01));
   }
 }
 
@@ -264,17 +264,18 @@ TEST_CASE("the torques do the work of the force in the pose of each tick, not of
     for (int at = -4; at <= 4; ++at) {
       CAPTURE(at);
       const ServoOutput out = armed.settled(at, 0.5, -at);
-      REQUIRE(length(out.force_n) > 0.2);
+      REQUIRE(length(out.commanded_force_n) > 0.2);
       // Of 1 mm along the force: its length, and the torques times the turns of the joints.
       const auto end = [&](double mm) {
-        const double part = mm / length(out.force_n);
-        return arm.joints_rad(
-            {at + part * out.force_n[0], 0.5 + part * out.force_n[1], -at + part * out.force_n[2]});
+        const double part = mm / length(out.commanded_force_n);
+        return arm.joints_rad({at + part * out.commanded_force_n[0],
+                               0.5 + part * out.commanded_force_n[1],
+                               -at + part * out.commanded_force_n[2]});
       };
       const JointVec<double> turned = end(0.5) - end(-0.5);
       const double work_mj = turned.x * out.torque_n_mm[0] + turned.y * out.torque_n_mm[1] +
                              turned.z * out.torque_n_mm[2];
-      CHECK(work_mj == doctest::Approx(length(out.force_n)).epsilon(0.005));
+      CHECK(work_mj == doctest::Approx(length(out.commanded_force_n)).epsilon(0.005));
     }
   }
 }

@@ -30,15 +30,16 @@ TEST_CASE("the force is stiffness times depth, along the normal, in every kind o
     CAPTURE(static_cast<int>(numeric));
     LoadedScene scene = swept_scene(numeric);
     ArmedServo armed(scene, {0, 3, 0});
-    CHECK(length(armed.settled(0, 1.2, 0).force_n) == 0);  // the ball ends at 0.2
+    CHECK(length(armed.settled(0, 1.2, 0).commanded_force_n) == 0);  // the ball ends at 0.2
     for (const double y_mm : {0.8, 0.3, -0.5, -2.0}) {
       const ServoOutput out = armed.settled(0.1, y_mm, 0.2);
       // A count of the encoders is up to 0.06 mm, so the depth is that of the place that was read.
       const double depth_mm = 1 - out.position_mm[1];
-      CHECK(out.force_n[1] == doctest::Approx(0.4 * depth_mm).epsilon(0.02));
+      CHECK(out.commanded_force_n[1] == doctest::Approx(0.4 * depth_mm).epsilon(0.02));
       CHECK(out.proxy_offset_mm[1] == doctest::Approx(depth_mm).epsilon(0.02));
-      CHECK(std::hypot(out.force_n[0], out.force_n[2]) < 0.02 * out.force_n[1]);
-      CHECK(length(out.tip_torque_n_mm) < 0.05 * out.force_n[1]);  // of a ball: none
+      CHECK(std::hypot(out.commanded_force_n[0], out.commanded_force_n[2]) <
+            0.02 * out.commanded_force_n[1]);
+      CHECK(length(out.tip_torque_n_mm) < 0.05 * out.commanded_force_n[1]);  // of a ball: none
       CHECK(armed.servo->penetration_mm() == doctest::Approx(depth_mm).epsilon(0.02));
     }
   }
@@ -49,7 +50,8 @@ TEST_CASE("a workspace scale leaves the stiffness at the device as it is") {
   scene.device.workspace_scale = 0.5;
   ArmedServo armed(scene, {0, 6, 0});
   const ServoOutput out = armed.settled(0, 1, 0);
-  CHECK(out.force_n[1] == doctest::Approx(0.4 * (1 - out.position_mm[1]) / 0.5).epsilon(0.02));
+  CHECK(out.commanded_force_n[1] ==
+        doctest::Approx(0.4 * (1 - out.position_mm[1]) / 0.5).epsilon(0.02));
 }
 
 TEST_CASE("a larger tool that takes over under pressure is pushed out with a ramp") {
@@ -61,8 +63,8 @@ TEST_CASE("a larger tool that takes over under pressure is pushed out with a ram
   double last_n = 0, most_n = 0;
   for (int tick = 0; tick < 200; ++tick) {
     const ServoOutput out = armed.step(0, -0.5, 0);
-    CHECK(length(out.contact_n) <= last_n + 0.1 + 1e-3);
-    last_n = length(out.contact_n);
+    CHECK(length(out.contact_force_n) <= last_n + 0.1 + 1e-3);
+    last_n = length(out.contact_force_n);
     most_n = std::max(most_n, last_n);
   }
   CHECK(most_n == doctest::Approx(0.4 * 2.5).epsilon(0.05));
@@ -78,7 +80,7 @@ TEST_CASE("a tool that turns is held by its whole shape, and its torque is told"
   ArmedServo armed(scene, {0, 3, 0});
   static_cast<void>(armed.settled(0, -0.5, 0));
   const ServoOutput out = armed.settled(0.9, -0.5, 0);  // the flank meets the wall x = 1
-  CHECK(out.force_n[0] < -0.1);
+  CHECK(out.commanded_force_n[0] < -0.1);
   CHECK(out.position_mm[0] + out.proxy_offset_mm[0] == doctest::Approx(0.5).epsilon(0.05));
   // Only the lower half of the flank is pushed: the force acts below the middle.
   CHECK(out.tip_torque_n_mm[2] < -0.02);

@@ -49,7 +49,8 @@ TEST_CASE("an arm meets the volume as the other has left it, in the same tick") 
   const std::uint64_t by_first = bench.out[0].removed_steps;
   CHECK(by_first > 0);
   for (int tick = 0; tick < 400; ++tick) bench.step({}, {{0, 3 - std::min(tick, 150) * 0.02, 0}});
-  CHECK(bench.out[1].force_n[1] < 0.05);  // the groove of the larger ball: nothing is left to feel
+  CHECK(bench.out[1].commanded_force_n[1] <
+        0.05);  // the groove of the larger ball: nothing is left to feel
 }
 
 TEST_CASE("each arm faults alone") {
@@ -86,7 +87,7 @@ TEST_CASE("an arm that is never docked costs the other nothing, and gets nothing
     one.step(stroke(tick));
     REQUIRE(both.out[0].output_hash == one.out[0].output_hash);
     REQUIRE_FALSE(both.out[1].started);
-    REQUIRE(both.out[1].motor_counts == std::array<std::int16_t, 3>{});
+    REQUIRE(both.out[1].dac_counts == std::array<std::int16_t, 3>{});
   }
 }
 
@@ -110,7 +111,7 @@ TEST_CASE("a reset and an undo take back what both have cut, and hold both hands
         CHECK((bench.out[1].resetting || bench.out[1].undoing) == runs);
         if (!runs) break;
         restored = bench.hash();
-        CHECK(length(bench.out[0].force_n) <= 0.51);  // within the slew of its first tick
+        CHECK(length(bench.out[0].commanded_force_n) <= 0.51);  // within the slew of its first tick
       }
       CHECK(ticks > 0);
       CHECK(restored == bench.first);
@@ -155,8 +156,8 @@ TEST_CASE("a tool is chosen for one arm; a hold is for both") {
   CHECK(bench.servo->apply({.kind = hold, .argument = 1}));
   for (int tick = 0; tick < 400; ++tick) bench.step(stroke(tick), stroke(tick));
   CHECK(bench.hash() == bench.first);
-  CHECK(bench.out[0].force_n == Place{});
-  CHECK(bench.out[1].force_n == Place{});
+  CHECK(bench.out[0].commanded_force_n == Place{});
+  CHECK(bench.out[1].commanded_force_n == Place{});
 }
 
 TEST_CASE("a snapshot of two arms continues to the bit, and does not fit one") {

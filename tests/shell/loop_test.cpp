@@ -185,7 +185,7 @@ TEST_CASE("of a tick that stood still itself nothing is sent, and of the next on
   auto& [port, driver, stop, signals, watchdog] = watched;
   kerf::ServoOutput push;
   push.motors_on = true;
-  push.motor_counts = {100, -200, 300};
+  push.dac_counts = {100, -200, 300};
   signals.stalled = true;  // the watchdog looked while the tick lasted
   kerf::send_tick(std::span(&push, 1), signals, driver);
   CHECK(port.neutral == 1);

@@ -76,7 +76,7 @@ class SharedTime {
 
 kerf::ServoOutput pushing() {
   kerf::ServoOutput output;
-  output.motor_counts = {500, 500, 500};
+  output.dac_counts = {500, 500, 500};
   output.motors_on = true;
   return output;
 }

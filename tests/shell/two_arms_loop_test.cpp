@@ -446,9 +446,9 @@ TEST_CASE("of a tick that stood still itself no device gets anything, of the nex
   std::array<ServoOutput, kMaxArms> outputs;
   for (ServoOutput& out : outputs) {
     out.motors_on = true;
-    out.motor_counts = {100, -200, 300};
+    out.dac_counts = {100, -200, 300};
   }
-  outputs[1].motor_counts = {1, 2, 3};
+  outputs[1].dac_counts = {1, 2, 3};
   std::atomic<bool> stop{false};
   LoopSignals signals{stop};
   signals.stalled = true;
@@ -462,7 +462,7 @@ TEST_CASE("of a tick that stood still itself no device gets anything, of the nex
   for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
     REQUIRE(ports[arm].sent.size() == 2);
     CHECK(ports[arm].sent[1].force_on);
-    CHECK(ports[arm].sent[1].force_mn == outputs[arm].motor_counts);
+    CHECK(ports[arm].sent[1].force_mn == outputs[arm].dac_counts);
   }
 }
 

@@ -111,22 +111,22 @@ TEST_CASE("the rules see each way to break them, and nothing else") {
           out.velocity_mm_per_s[1] = std::numeric_limits<double>::quiet_NaN();
         }) == "finite ");
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput& out) {
-          out.force_n = {0, 0.49, 0};
+          out.commanded_force_n = {0, 0.49, 0};
         }).empty());
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput& out) {
-          out.force_n = {0, 0.51, 0};
+          out.commanded_force_n = {0, 0.51, 0};
         }) == "slew ");
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput& out) {
-          out.force_n = {0, 3.31, 0};
+          out.commanded_force_n = {0, 3.31, 0};
         }) == "clamp slew ");
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput& out) {
-          out.motors_on = false, out.motor_counts[2] = 1;
+          out.motors_on = false, out.dac_counts[2] = 1;
         }) == "off ");
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput& out) { out.phase = Phase::armed; }) ==
         "off ");
   CHECK(rule_broken_by([](DeviceReport& report, ServoOutput& out) {
           report.fresh = false;
-          out.force_n = {0.1, 0, 0};
+          out.commanded_force_n = {0.1, 0, 0};
         }) == "stale ");
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput& out) {
           out.position_mm = {0, 11, 0};

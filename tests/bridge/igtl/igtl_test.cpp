@@ -398,7 +398,7 @@ TEST_CASE("a client rebuilds what is milled and what is reset, from parts, equal
       writer.publish_box(0, armed.servo->density(0), out.changed[0],
                          static_cast<std::uint32_t>(out.removed_steps));
     }
-    writer.publish_state(record_at({x_mm, y_mm, 0}, {0, 0, 0, 1}, out.force_n));
+    writer.publish_state(record_at({x_mm, y_mm, 0}, {0, 0, 0, 1}, out.commanded_force_n));
     writer.end_tick(tick * 1'000'000);
     if (tick % 20 == 0) REQUIRE(client.take());
   };

@@ -160,7 +160,7 @@ int end_after_torque(const std::string& bus, Personality personality, const WayO
     kerf::MotorGuard guard(*driver);
     const kerf::HandlerStack handlers = guard.guard_stack();
     ServoOutput output;
-    output.motor_counts = {100, 100, 100};
+    output.dac_counts = {100, 100, 100};
     output.motors_on = true;
     int fresh = 0;  // so that a device on a busy machine has had its commands
     for (int tick = 0; tick < 5000 && fresh < 100; ++tick) {

@@ -409,7 +409,8 @@ TEST_CASE("usb, hid: one of two devices dies, the other's force and timing stay 
   int contact = 0;
   arm_session.watch([&](const kerf::ServoOutput& output) {
     if (!output.contact || ++contact <= kSettle) return;
-    const double n = std::hypot(output.force_n[0], output.force_n[1], output.force_n[2]);
+    const double n = std::hypot(output.commanded_force_n[0], output.commanded_force_n[1],
+                                output.commanded_force_n[2]);
     (falcon_port->closed() ? after_n : before_n).push_back(n);
   });
   std::atomic<bool> arm_done{false}, falcon_pushes{false};

@@ -107,8 +107,8 @@ HandRun run_hand(LoadedScene scene, const HandScript& hand, double seconds) {
       removed_mm3 += mm3_per_step[v] * static_cast<double>(out.removed_by_volume[v]);
     }
     const double height_mm = out.position_mm[1] - scene.device.offset_mm[1];
-    run.ticks.push_back({height_mm, height_mm + out.proxy_offset_mm[1], out.force_n, removed_mm3,
-                         out.contact, loop.step_us()});
+    run.ticks.push_back({height_mm, height_mm + out.proxy_offset_mm[1], out.commanded_force_n,
+                         removed_mm3, out.contact, loop.step_us()});
   }
   return run;
 }

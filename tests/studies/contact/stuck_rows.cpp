@@ -281,12 +281,13 @@ struct Pressed {
 /// The part of the sent force that the head must bear, whatever the shaft does.
 double force_on_head(CuttingHand& miller, const LoadedScene& scene, const SceneTool& tool,
                      const ServoOutput& out) {
-  const double force_n = length(out.force_n);
+  const double force_n = length(out.commanded_force_n);
   if (tool.shaft.radius_mm <= 0 || force_n <= 0) return force_n;
   Point centre_mm{};
   for (std::size_t i = 0; i < 3; ++i) centre_mm[i] = out.position_mm[i] + out.proxy_offset_mm[i];
   const ShaftTouch touch(scene.volumes[0], miller.servo().density(0));
-  return force_n * touch.least_head_share(tool, centre_mm, out.rotation, -1 * out.force_n);
+  return force_n *
+         touch.least_head_share(tool, centre_mm, out.rotation, -1 * out.commanded_force_n);
 }
 
 /// How a hand presses.
@@ -321,7 +322,7 @@ Pressed press(CuttingHand& miller, const Hand& how, const LoadedScene& scene, co
     hand = hand + std::min(1.0, step_mm / std::max(step_mm, length(way))) * way;
     const ServoOutput out = miller.step(hand);
     for (std::size_t i = 0; i < 3; ++i) proxy[i] = out.position_mm[i] + out.proxy_offset_mm[i];
-    const bool must_cut = length(out.force_n) > must_cut_n;
+    const bool must_cut = length(out.commanded_force_n) > must_cut_n;
     seen.touched = seen.touched || must_cut;
     still = must_cut && out.removed_steps == 0 ? still + 1 : 0;
     if (judged(still) > judged(still - 1) &&
@@ -336,7 +337,7 @@ Pressed press(CuttingHand& miller, const Hand& how, const LoadedScene& scene, co
     // A load that a shaft may have borne is judged only if it lasts.
     if (tool.shaft.radius_mm <= 0) seen.longest_s = std::max(seen.longest_s, still * tick_s);
   }
-  seen.held_n = length(miller.hold(hand, kRestS).force_n);
+  seen.held_n = length(miller.hold(hand, kRestS).commanded_force_n);
   return seen;
 }
 

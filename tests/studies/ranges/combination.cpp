@@ -224,7 +224,7 @@ void check_expectation(const Expectation& expected, const ServoOutput& out, bool
       if (out.phase == Phase::active && out.motors_on == motors) return;
       return rules.broken("active", "phase " + phase);
     case Expectation::Kind::faded:
-      if (!out.motors_on && out.force_n == std::array<double, 3>{}) return;
+      if (!out.motors_on && out.commanded_force_n == std::array<double, 3>{}) return;
       return rules.broken("faded", "phase " + phase);
     case Expectation::Kind::armed:
       if (out.phase == Phase::armed && out.fault == Fault::none) return;

@@ -102,7 +102,7 @@ double rest_cycle_mm(NumericKind numeric, double quantum_mm) {
   for (int i = 0; i < 110; ++i) static_cast<void>(servo->step(report_at(start_mm)));
   double y_mm = start_mm, v_mm_per_s = 0, low = 1e9, high = -1e9;
   for (int tick = 0; tick < kTicks; ++tick) {
-    const double force_n = servo->step(report_at(y_mm)).force_n[1];
+    const double force_n = servo->step(report_at(y_mm)).commanded_force_n[1];
     for (int step = 0; step < kSteps; ++step) {
       const double push_n = force_n + kHandNPerMm * (kAimMm - y_mm) - kDampingNsPerMm * v_mm_per_s;
       v_mm_per_s += push_n / kMassKg * 1000 * kDt;
@@ -123,7 +123,7 @@ std::string measure_stiffness(const StudySize& effort, const std::vector<KeyRow>
     const StressInput hand = hard_hand(scene);
     const auto servo = compile(scene);
     for (const DeviceReport& report : hand.reports) {
-      if (servo->step(report).force_n == std::array<double, 3>{}) continue;
+      if (servo->step(report).commanded_force_n == std::array<double, 3>{}) continue;
       found.push_back({"zero", "a stiffness of 0 gives a force"});
       break;
     }
@@ -155,7 +155,7 @@ std::string measure_voxel_sizes(const StudySize& effort, const std::vector<KeyRo
       const auto held = hand.reports.back();
       for (int tick = 0; tick < 200; ++tick) out = servo->step(held);
       const double depth_mm = (radius_mm - out.position_mm[1]) / scale;
-      const double error = std::abs(out.force_n[1] / (stiffness * depth_mm) - 1);
+      const double error = std::abs(out.commanded_force_n[1] / (stiffness * depth_mm) - 1);
       worst = std::max(worst, error);
       // A twentieth of a voxel of the coarsest edge, of the depth, and the normal's 1 %.
       const double blur = 0.05 * std::ranges::max(mm) / scale / depth_mm + 0.01;
@@ -192,8 +192,9 @@ std::string measure_fields(const StudySize& effort, const std::vector<KeyRow>&, 
         for (const DeviceReport& report : hand.reports) {
           const ServoOutput out = servo->step(report);
           rules.look_at(report, out);
-          most_n = std::max({most_n, std::abs(out.force_n[0]), std::abs(out.force_n[1]),
-                             std::abs(out.force_n[2])});
+          most_n =
+              std::max({most_n, std::abs(out.commanded_force_n[0]),
+                        std::abs(out.commanded_force_n[1]), std::abs(out.commanded_force_n[2])});
         }
         for (const Violation& violation : rules.violations())
           found.push_back({violation.rule, field.name + (": " + violation.what)});
@@ -237,7 +238,8 @@ std::string measure_denormals(const StudySize&, const std::vector<KeyRow>&, Foun
   ServoOutput out;
   for (int tick = 0; tick < kTicks; ++tick) {
     out = servo->step(rest);
-    for (const auto& list : {out.force_n, out.contact_n, out.velocity_mm_per_s, out.torque_n_mm}) {
+    for (const auto& list :
+         {out.commanded_force_n, out.contact_force_n, out.velocity_mm_per_s, out.torque_n_mm}) {
       for (const double x : list)
         subnormal += x != 0 && std::abs(x) < std::numeric_limits<double>::min() ? 1 : 0;
     }

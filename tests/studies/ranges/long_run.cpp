@@ -51,7 +51,9 @@ class Watch {
   void book(const DeviceReport& report, const ServoOutput& out) {
     double booked_mj = out.absorbed_mj - last_.absorbed_mj;
     const bool even = run_.ticks > 0 && report.fresh && !last_.stale;
-    if (even) booked_mj = minus_work_mj(last_.force_n, last_.position_mm, out.position_mm) / scale_;
+    if (even)
+      booked_mj =
+          minus_work_mj(last_.commanded_force_n, last_.position_mm, out.position_mm) / scale_;
     own_mj_ += booked_mj;
     run_.ledger_off_mj = std::max(run_.ledger_off_mj, std::abs(own_mj_ - out.absorbed_mj));
     last_ = out;

@@ -40,8 +40,8 @@ const char* not_finite(const ServoOutput& out) {
       {"position_mm", out.position_mm},
       {"rotation", out.rotation},
       {"velocity_mm_per_s", out.velocity_mm_per_s},
-      {"force_n", out.force_n},
-      {"contact_n", out.contact_n},
+      {"force_n", out.commanded_force_n},
+      {"contact_n", out.contact_force_n},
       {"modification_n", out.modification_n},
       {"torque_n_mm", out.torque_n_mm},
       {"proxy_offset_mm", out.proxy_offset_mm},
@@ -80,10 +80,10 @@ void Rules::broken(const char* rule, std::string what) {
 
 void Rules::look_at_force(const ServoOutput& out, bool leaves) {
   constexpr double kRounding = 4.0 / 65536;  // of the loop's coarsest force, N
-  const double force_n = length(out.force_n);
+  const double force_n = length(out.commanded_force_n);
   if (!(force_n <= force_n_)) broken("clamp", format("%.9g N above %.9g", force_n, force_n_));
-  const int most = std::max({std::abs(out.motor_counts[0]), std::abs(out.motor_counts[1]),
-                             std::abs(out.motor_counts[2])});
+  const int most = std::max(
+      {std::abs(out.dac_counts[0]), std::abs(out.dac_counts[1]), std::abs(out.dac_counts[2])});
   if (most > motor_end_) broken("clamp", format("%d motor counts, beyond %d", most, motor_end_));
   if (!out.motors_on) {
     if (most != 0 || force_n != 0) broken("off", format("%d counts, %.9g N", most, force_n));
@@ -92,11 +92,12 @@ void Rules::look_at_force(const ServoOutput& out, bool leaves) {
   const bool may =
       (out.phase == Phase::ramping || out.phase == Phase::active) && out.fault == Fault::none;
   if (!may) broken("off", "motors on in phase " + std::to_string(static_cast<int>(out.phase)));
-  const double step_n = leaves || most >= motor_end_ ? beyond_fall(out.force_n, last_force_n_)
-                                                     : length(out.force_n - last_force_n_);
+  const double step_n = leaves || most >= motor_end_
+                            ? beyond_fall(out.commanded_force_n, last_force_n_)
+                            : length(out.commanded_force_n - last_force_n_);
   if (!(step_n <= slew_n_ + kRounding))
     broken("slew", format("%.9g N in a tick, above %.9g", step_n, slew_n_));
-  const double whole_n = length(out.force_n - last_force_n_);
+  const double whole_n = length(out.commanded_force_n - last_force_n_);
   const double bound_n = std::max(slew_n_, length(last_force_n_));
   if (!(whole_n <= bound_n + kRounding))
     broken("slew", format("%.9g N in a tick, above %.9g in all", whole_n, bound_n));
@@ -127,7 +128,7 @@ void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
       report.fresh && dot(last_force_n_, moved_mm) >= -unknown_mm * length(last_force_n_);
   look_at_force(out, leaves);
   stale_ticks_ = report.fresh ? 0 : stale_ticks_ + 1;
-  if (stale_ticks_ > 0 && length(out.force_n) > length(last_force_n_) + 1e-4) {
+  if (stale_ticks_ > 0 && length(out.commanded_force_n) > length(last_force_n_) + 1e-4) {
     broken("stale", "a force grows without reports");
   }
   if (stale_ticks_ >= zero_ticks_ && out.motors_on)
@@ -148,7 +149,7 @@ void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
     broken("work", format("%.0f samples, planned with %.0f", static_cast<double>(out.samples_read),
                           static_cast<double>(most_samples_)));
   }
-  last_force_n_ = out.force_n;
+  last_force_n_ = out.commanded_force_n;
   ++tick_;
 }
 
