@@ -4,7 +4,7 @@
 import re
 
 # What a command of the pages begins with. A block of indented lines in which a line begins so is a shell's.
-HEADS = re.compile(r"(\./kerf|\.ci/\S+|hil/\S+\.sh|build/\S+|cat|cmake|cp|ctest|echo|export|grep|openssl|parallel|pip|podman|"
+HEADS = re.compile(r"\(?(\./kerf|\.ci/\S+|hil/\S+\.sh|build/\S+|cat|cd|cmake|cp|ctest|echo|export|grep|openssl|parallel|pip|podman|"
                    r"python3|scp|sudo|tests/\S+\.sh|venv/bin/\S+|wait|kerf-\S+ --socket)( |$)|([A-Z_]+=\S+ +)+build/")
 
 

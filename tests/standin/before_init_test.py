@@ -113,7 +113,8 @@ OF_NO_DEVICE = {"dhdGetDeviceCount", "dhdGetAvailableCount", "dhdGetSDKVersion",
 FALSE = {"dhdHasBase", "dhdHasWrist", "dhdHasActiveWrist", "dhdHasGripper", "dhdHasActiveGripper", "dhdIsLeftHanded",
          "dhdGetSystemName", "dhdGetButtonMask", "drdIsInitialized", "drdIsSupported", "drdIsRunning", "drdIsMoving", "drdIsFiltering"}
 # functions that return a double
-NUMBERS = {"dhdGetComFreq", "drdGetCtrlFreq", "dhdGetMaxForce", "dhdGetMaxTorque", "dhdGetMaxGripperForce"}
+NUMBERS = {"dhdGetComFreq", "drdGetCtrlFreq", "dhdGetMaxForce", "dhdGetMaxTorque", "dhdGetMaxGripperForce", "drdGetEncPGain",
+           "drdGetEncIGain", "drdGetEncDGain", "drdGetMotRatioMax"}
 
 
 class BeforeInit(Case):
