@@ -28,8 +28,17 @@ Child::Child(const std::vector<std::string>& arguments, std::filesystem::path ou
     throw HilError(arguments[0] + ": cannot be started (" + std::generic_category().message(errno) +
                    "); build it, or install all of kerf");
   }
-  // Whatever ends this program, SIGKILL too, ends the child.
-  std::string tied[] = {"setpriv", "--pdeathsig", "TERM", "--"};
+  // Whatever ends this program, SIGKILL too, ends the child. The signal of the kernel comes only
+  // from when setpriv has asked for it, so what is started then looks whether this program still
+  // runs.
+  std::string tied[] = {"setpriv",
+                        "--pdeathsig",
+                        "TERM",
+                        "--",
+                        "sh",
+                        "-c",
+                        R"([ "$PPID" = "$0" ] && exec "$@")",
+                        std::to_string(getpid())};
   std::vector<char*> argv;
   for (std::string& word : tied) argv.push_back(word.data());
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
