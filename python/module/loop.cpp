@@ -70,7 +70,7 @@ Sent sent_of(const TickRecord& tick) {
 TickRecord record_of(const Sent& sent, Tick tick) {
   TickRecord record{};
   record.tick = tick;
-  std::copy(sent.dac_counts.begin(), sent.motor_counts.end(), record.dac_counts);
+  std::copy(sent.dac_counts.begin(), sent.dac_counts.end(), record.dac_counts);
   record.phase = sent.phase;
   record.flags = sent.motors_on ? kFlagMotorsOn : 0;
   return record;
