@@ -97,7 +97,7 @@ typedef struct {
 typedef struct {
   uint64_t magic;
   uint32_t layout, arms, rate_hz, reserved;
-  uint64_t session;       /* 0: the controller is not ready, or has ended */
+  uint64_t session;       /* 0: the controller has ended */
   double workspace_scale; /* mm of the scene for each mm of the device */
   uint8_t room[256 - 5 * sizeof(uint64_t)];
   kerf_external_arm arm[KERF_EXTERNAL_ARMS];
@@ -186,14 +186,17 @@ static inline const char* kerf_external_open(kerf_external* out, const char* nam
     out->arms = out->page->arms;
     out->rate_hz = out->page->rate_hz;
     out->workspace_scale = out->page->workspace_scale;
-    if (out->page->magic == KERF_EXTERNAL_MAGIC && out->page->layout == KERF_EXTERNAL_LAYOUT &&
-        out->arms >= 1 && out->arms <= KERF_EXTERNAL_ARMS && out->session != 0) {
+    if (out->page->magic != KERF_EXTERNAL_MAGIC || out->page->layout != KERF_EXTERNAL_LAYOUT ||
+        out->arms < 1 || out->arms > KERF_EXTERNAL_ARMS) {
+      snprintf(why, sizeof why,
+               "%s: no page of layout %u; compile with the header of that kerf, or start the "
+               "controller again",
+               path, KERF_EXTERNAL_LAYOUT);
+    } else if (out->session == 0) {
+      snprintf(why, sizeof why, "%s: its controller has ended; start it again", path);
+    } else {
       return NULL;
     }
-    snprintf(why, sizeof why,
-             "%s: no page of layout %u, or not ready; compile with the header of that kerf, or "
-             "start the controller again",
-             path, KERF_EXTERNAL_LAYOUT);
     munmap(out->page, KERF_EXTERNAL_BYTES);
     out->page = NULL;
   }

@@ -43,9 +43,12 @@ std::size_t part_of(std::size_t arm) noexcept {
 ExternalPage::ExternalPage(std::string_view name, const Run& run)
     : path_(segment_folder() + "/external-" + std::string(name) + ".page"),
       stale_ticks_(run.stale_ticks) {
-  unlink(path_.c_str());  // of a run that was killed
-  file_ = OwnedFd(open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
-  if (file_.get() < 0) throw failure(path_);
+  // A program finds the page complete or not at all: it has its name from the last line on.
+  const std::string unfinished = path_ + ".new";
+  unlink(unfinished.c_str());  // of a run that was killed
+  file_ =
+      OwnedFd(open(unfinished.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
+  if (file_.get() < 0) throw failure(unfinished);
   struct flock lock {};
   lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
@@ -78,6 +81,7 @@ ExternalPage::ExternalPage(std::string_view name, const Run& run)
   for (std::size_t arm = 0; arm < run.arms; ++arm) publish(arm, none);
   word(at(offsetof(kerf_external_page, session)))
       .store(random_session_id(), std::memory_order_release);
+  if (rename(unfinished.c_str(), path_.c_str()) != 0) throw failure(path_);
 }
 
 ExternalPage::~ExternalPage() {

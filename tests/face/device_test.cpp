@@ -192,6 +192,35 @@ TEST_CASE("no controller, one that has ended, one that was killed, a page of ano
   CHECK(problem_of("short").find("too short for a page") != std::string::npos);
 }
 
+TEST_CASE("a program that opens while controllers come and go finds a whole page or none") {
+  const Folder folder;
+  std::atomic<bool> done = false;
+  std::atomic<int> tries = 0;
+  std::thread controllers([&] {
+    for (int run = 0; run < 200; ++run) {
+      const kerf::ExternalPage page("kerf", {});
+      const int before = tries;
+      while (tries < before + 2) std::this_thread::yield();  // one try at least while it is there
+    }
+    done = true;
+  });
+  std::string other;
+  int opened = 0;
+  for (; !done; ++tries) {
+    kerf_external external;
+    const char* const why = kerf_external_open(&external, "kerf");
+    const std::string problem = why == nullptr ? "" : why;
+    opened += why == nullptr ? 1 : 0;
+    kerf_external_close(&external);
+    const bool expected = problem.empty() || problem.find("no controller") != std::string::npos ||
+                          problem.find("has ended") != std::string::npos;
+    if (!expected) other = problem;
+  }
+  controllers.join();
+  CHECK(other == "");
+  CHECK(opened >= 200);
+}
+
 TEST_CASE("neither side sees half of what the other one writes") {
   const Folder folder;
   kerf::ExternalPage page("d", {});
