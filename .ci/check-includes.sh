@@ -13,7 +13,7 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 rooms='
 include/kerf
 
-shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment shared/external shared/arm
+shared/numeric shared/volume shared/wire shared/text shared/posix shared/device shared/segment shared/external shared/arm
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/law controller/servo controller/tick controller/law/registry

@@ -241,7 +241,7 @@ class Demo:
         elif options.port == "socket" and rate_hz > 2000:
             pace = ["--packet-cycles", 8000 // rate_hz]  # else it checks for the host 2000 times a second
         self.emulator = processes.start("emulator", [
-            "--personality", options.device, *self.offer, *hand, "--unit-mm", told.get("hand_unit_mm", ""), *pace,
+            "--personality", options.device, *self.offer, *hand, *self.identified("identified", told), "--unit-mm", told.get("hand_unit_mm", ""), *pace,
             "--report", os.path.join(self.results, "emulator.json")], out="emulator.log", log="emulator.log")
         while not self.is_met() and self.emulator.poll() is None:
             time.sleep(0.02)
@@ -255,7 +255,7 @@ class Demo:
         if options.second and self.emulator is not None:
             self.second = processes.start("emulator", [
                 "--personality", options.second, "--front", "socket", "--socket", processes.path("device-2"),
-                *self.script_of("second_hand_script", told), "--unit-mm", told.get("second_hand_unit_mm", ""), *pace,
+                *self.script_of("second_hand_script", told), *self.identified("second_identified", told), "--unit-mm", told.get("second_hand_unit_mm", ""), *pace,
                 "--report", os.path.join(self.results, "emulator-2.json")], out="emulator-2.log", log="emulator-2.log")
 
     def service(self):
@@ -284,6 +284,11 @@ class Demo:
         if self.options.hand:
             return ["--hand", self.options.hand]
         return self.script_of("hand_script", told)
+
+    @staticmethod
+    def identified(name, told):
+        """What the emulator has to be like, if the scene says."""
+        return ["--identified", told[name]] if told.get(name) else []
 
     def script_of(self, name, told):
         script = told.get(name, "")

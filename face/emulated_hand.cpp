@@ -6,6 +6,7 @@
 
 #include "controller/load/load_scene.hpp"
 #include "hil/device/emulator.hpp"
+#include "hil/script/identified_plant.hpp"
 
 namespace kerf {
 namespace {
@@ -29,9 +30,14 @@ HandScript with_unit(HandScript script, const LoadedScene& scene) {
   return script;
 }
 
-std::unique_ptr<DeviceModel> model_for(Personality personality, const HandScript& script) {
-  return with_device_params(personality, [&](auto params) {
+std::unique_ptr<DeviceModel> model_for(const LoadedScene& scene, const HandScript& script) {
+  PlantValues identified;
+  if (scene.identified) {
+    identified = plant_of(*scene.identified, scene.servo.rate_hz, scene.device.identified);
+  }
+  return with_device_params(scene.device.personality, [&](auto params) {
     take_plant(script.plant, params);
+    take_plant(identified, params);
     return make_model(params);
   });
 }

@@ -20,8 +20,8 @@ namespace kerf {
 /// `script` with a unit: its own, or the text of the scene's `hand_unit_mm`.
 [[nodiscard]] HandScript with_unit(HandScript script, const LoadedScene& scene);
 
-/// The device that the script is for.
-[[nodiscard]] std::unique_ptr<DeviceModel> model_for(Personality personality,
+/// The device of the scene, as identified if it is, that the script is for. Throws HilError.
+[[nodiscard]] std::unique_ptr<DeviceModel> model_for(const LoadedScene& scene,
                                                      const HandScript& script);
 
 }  // namespace kerf

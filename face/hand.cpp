@@ -63,7 +63,7 @@ struct Hand::Parts {
         const std::filesystem::path& faults)
       : device(scene.device),
         played(script_of(script, scene)),
-        emulator(model_for(device.personality, played), played),
+        emulator(model_for(scene, played), played),
         faulty(emulator, faults_of(faults)),
         port(faulty, device.personality, rate_of(scene)),
         driver(make_driver(device.personality, port, device.encoder_sign, rate_of(scene))) {

@@ -2,17 +2,21 @@
 #include "kerf/stability.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <exception>
 #include <thread>
 #include <utility>
 
+#include "controller/stability/identified_loop.hpp"
 #include "controller/stability/sampled_loop.hpp"
 #include "face/loaded.hpp"
 #include "lab/stability/axes.hpp"
+#include "lab/stability/device_file.hpp"
 #include "lab/stability/map.hpp"
 #include "lab/stability/one_axis.hpp"
+#include "shared/device/identified_device.hpp"
 #include "shared/text/text.hpp"
 #include "shared/wire/personality.hpp"
 
@@ -60,6 +64,31 @@ zwidth::LoopCase case_of(const WallRun& run) {
   return subject;
 }
 
+constexpr std::size_t kDevice = static_cast<std::size_t>(zwidth::AxisId::device);
+
+bool is_file(std::string_view device) {
+  return device.ends_with(".toml");
+}
+
+/// Puts the axes of a device that is a file in the place of its name.
+void take_file(const std::string& direction, std::array<std::string, zwidth::kAxisCount>& texts,
+               std::array<bool, zwidth::kAxisCount>& given) {
+  const std::string device = texts[kDevice];
+  if (!is_file(device) || device.find(',') != std::string::npos) {
+    if (device.find(".toml") != std::string::npos) {
+      throw Error("device: " + one_line(device) + ": give one file alone");
+    }
+    if (direction.empty()) return;
+    throw Error("direction: " + one_line(direction) +
+                ": is that of a file as the device; give such as device.toml, or leave it out");
+  }
+  static_cast<void>(zwidth::take_device(device, direction.empty() ? "worst" : direction, texts));
+  given[kDevice] = false;
+  for (std::size_t number = 0; number < texts.size(); ++number) {
+    if (number != kDevice && !texts[number].empty()) given[number] = true;
+  }
+}
+
 zwidth::MapSpec spec_of(std::string_view stiffness, const std::vector<MapAxis>& axes,
                         const MapOptions& options) {
   require_within("seconds", options.seconds, 0.001, zwidth::kLongestLimitS);
@@ -69,11 +98,19 @@ zwidth::MapSpec spec_of(std::string_view stiffness, const std::vector<MapAxis>& 
   spec.seconds = options.seconds;
   spec.seed = options.seed;
   spec.seeds = options.seeds;
+  std::array<std::string, zwidth::kAxisCount> texts;
+  std::array<bool, zwidth::kAxisCount> given{};
   for (const MapAxis& axis : axes) {
     const std::size_t number = zwidth::axis_named("axis", axis.name);
     if (number == zwidth::kAxisCount) throw Error("axis stiffness: it is the first argument");
-    if (!spec.table[number].empty()) throw Error("axis " + axis.name + ": given twice");
-    spec.table[number] = zwidth::axis_values(static_cast<zwidth::AxisId>(number), axis.values);
+    if (given[number]) throw Error("axis " + axis.name + ": given twice");
+    given[number] = true;
+    texts[number] = axis.values;
+  }
+  take_file(options.direction, texts, given);
+  for (std::size_t number = 0; number < texts.size(); ++number) {
+    if (!given[number]) continue;
+    spec.table[number] = zwidth::axis_values(static_cast<zwidth::AxisId>(number), texts[number]);
   }
   return spec;
 }
@@ -103,12 +140,21 @@ std::string problem_in(const SampledLoop& loop) {
   return {};
 }
 
-SampledLoop device_loop(std::string_view device, double rate_hz) {
+SampledLoop device_loop(std::string_view device, double rate_hz, std::string_view direction) {
+  require_within("rate_hz", rate_hz, 1, 1e6);
+  if (is_file(device)) {
+    constexpr double kDamping = 0.002;  // of which the worst direction is taken
+    return or_error([&] {
+      const IdentifiedDevice found = read_identified_device(device);
+      const std::string text(direction.empty() ? "worst" : direction);
+      const DeviceDirection along = zwidth::direction_of(found, text, kDamping, rate_hz);
+      return loop_along(found, along, rate_hz, false);
+    });
+  }
   const auto personality = personality_of(device);
   if (!personality) {
     throw Error("device: " + one_line(device) + unknown_word(device, kPersonalityWords));
   }
-  require_within("rate_hz", rate_hz, 1, 1e6);
   return unheld_loop(*personality, rate_hz);
 }
 
@@ -146,9 +192,10 @@ LimitCycle run_on_wall(const WallRun& run, const WallWatch& watch) {
   return seen;
 }
 
-SampledLoop column_loop(const std::vector<MapAxis>& axes) {
+SampledLoop column_loop(const std::vector<MapAxis>& axes, std::string_view direction) {
   return or_error([&] {
-    const std::vector<zwidth::Assignment> all = spec_of("1", axes, {}).columns();
+    const std::vector<zwidth::Assignment> all =
+        spec_of("1", axes, {.direction = std::string(direction)}).columns();
     if (all.size() != 1) {
       throw Error("axes: " + std::to_string(all.size()) + " columns; give each axis one value");
     }
@@ -166,7 +213,9 @@ StabilityMap stability_map(std::string_view stiffness, const std::vector<MapAxis
     for (std::size_t i = 0; i < all.size(); ++i) {
       MapColumn& column = map.columns[i];
       for (const MapAxis& axis : axes) {
-        column.values.push_back(all[i][zwidth::axis_named("axis", axis.name)]);
+        const std::size_t number = zwidth::axis_named("axis", axis.name);
+        const bool named = number == kDevice && is_file(axis.values);
+        column.values.push_back(named ? axis.values : all[i][number]);
       }
       column.impossible = zwidth::impossible(spec, zwidth::subject_of(all[i]));
       if (column.impossible.empty()) wanted.push_back(i);

@@ -60,6 +60,7 @@ bool keep_meshes(const ReplayChanges& changes) {
 RecordedInputs recorded_inputs(const std::filesystem::path& folder, InputsInJson from,
                                const ReplayChanges& changes) {
   RecordedInputs out = std::move(from.inputs);
+  out.without_device_file = true;
   if (!keep_meshes(changes)) out.meshes.clear();
   const bool same_volumes = keep_volumes(changes);
   for (std::size_t v = 0; v < out.volumes.size(); ++v) {

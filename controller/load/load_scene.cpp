@@ -189,6 +189,12 @@ void replace_devices(const SceneOverrides& overrides, SceneSpec& scene) {
   const auto replace = [&](DeviceSettings& device,
                            const std::optional<std::array<double, 3>>& torque_scale) {
     if (overrides.personality && *overrides.personality != device.personality) {
+      if (!device.identified.empty()) {
+        refuse("--device " + std::string(word_of(*overrides.personality)),
+               ": the scene's device.identified is of its " +
+                   std::string(word_of(device.personality)) +
+                   "; leave the option out, or give --set device.personality");
+      }
       device.personality = *overrides.personality;
       device.torque_scale.reset();  // of another device's motors
     }
@@ -402,6 +408,19 @@ void finish_second_arm(const Point3& apart_mm, bool of_command_line, LoadedScene
   }
 }
 
+/// Of `device.identified`, at the scene's rate.
+std::optional<IdentifiedDevice> identified_device(const DeviceSettings& device, int rate_hz) {
+  if (device.identified.empty()) return std::nullopt;
+  try {
+    const IdentifiedDevice found = read_identified_device(device.identified);
+    if (found.most_delay_s * rate_hz < kMostIdentifiedPeriods) return found;
+  } catch (const DeviceFileError& error) {
+    throw LoadError(error.what());
+  }
+  refuse(device.identified, ": device.delay_s is 64 periods and more at servo.rate_hz = " +
+                                std::to_string(rate_hz) + "; lower the rate");
+}
+
 void load_tools(const SceneSpec& spec, const std::filesystem::path& folder,
                 const SceneOverrides& overrides, const RecordedInputs& recorded, bool fitted,
                 LoadedScene& scene) {
@@ -472,6 +491,11 @@ LoadedScene load_parsed(SceneSpec spec, const std::filesystem::path& path,
         scene.volumes.begin(), scene.volumes.end(), [](const SceneVolume& v) { return v.solid; }));
   }
   finish_second_arm(apart_mm, overrides.volume_file.has_value(), scene);
+  if (recorded.without_device_file) return scene;
+  scene.identified = identified_device(scene.device, scene.servo.rate_hz);
+  if (scene.second) {
+    scene.second_identified = identified_device(scene.second->device, scene.servo.rate_hz);
+  }
   return scene;
 }
 

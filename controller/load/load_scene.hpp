@@ -82,6 +82,8 @@ struct RecordedInputs {
   /// text.
   std::vector<std::optional<SceneVolume>> volumes{};
   std::vector<std::pair<std::string, ToolMesh>> meshes{};  ///< by the name of the tool
+  /// No `device.identified` is read: a recording has its ticks, and the file may be gone.
+  bool without_device_file = false;
 };
 
 /// Loads a scene from `text`, which the file at `path` has, or had.

@@ -186,6 +186,7 @@ LoadedScene second_arm_of(const LoadedScene& scene) {
   second.second.reset();
   second.tools = scene.tools;
   second.active_tool = scene.second_tool;
+  second.identified = scene.second_identified;
   return second;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/denoise.hpp"
 #include "controller/volume/file/volume_image.hpp"
+#include "shared/device/identified_device.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
 // A scene after loading, and the geometry of its volumes.
@@ -47,6 +49,8 @@ struct LoadedScene : SceneSettings {
   std::size_t second_tool = 0;           ///< of the second arm
   std::vector<VolumeSpec> volume_specs;  ///< as written in the file and on the command line
   std::vector<ToolSpec> tool_specs;      ///< as written, with the sizes in effect
+  /// Of `device.identified`; none: the figures of the personality. Changes no tick.
+  std::optional<IdentifiedDevice> identified, second_identified;
 };
 
 [[nodiscard]] inline std::size_t arms_of(const SceneSettings& scene) noexcept {

@@ -14,6 +14,7 @@
 #include "controller/plan/plan_device.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/stability/axis_simulation.hpp"
+#include "controller/stability/identified_loop.hpp"
 #include "controller/stability/sampled_loop.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/text/text.hpp"
@@ -72,8 +73,18 @@ std::string device_word(const LoadedScene& scene) {
   return std::string(word_of(scene.device.personality));
 }
 
+/// Of the personality; or of the identified device, across its worst direction, with friction and
+/// delay as unfavourable as their intervals allow.
+SampledLoop bare_loop(const LoadedScene& scene) {
+  const double rate_hz = scene.servo.rate_hz;
+  if (!scene.identified) return unheld_loop(scene.device.personality, rate_hz);
+  const DeviceDirection worst =
+      worst_direction(*scene.identified, scene.force.damping_ns_per_mm, rate_hz);
+  return loop_along(*scene.identified, worst, rate_hz, true);
+}
+
 SampledLoop loop_of(const LoadedScene& scene) {
-  SampledLoop loop = unheld_loop(scene.device.personality, scene.servo.rate_hz);
+  SampledLoop loop = bare_loop(scene);
   const LawChoice& estimator = scene.servo.velocity;
   if (estimator.name == Difference<DoubleNumbers>::kName && !estimator.settings.empty()) {
     loop.velocity_filter_s = estimator.settings.front().second / 1000;  // its only one
@@ -87,7 +98,7 @@ bool has_law(const LoadedScene& scene) {
 
 /// Parts of the loop that the boundary leaves out, as an end of its line.
 std::string not_counted(const LoadedScene& scene) {
-  std::string text;
+  std::string text = scene.identified ? ", identified" : "";
   const std::string& estimator = scene.servo.velocity.name;
   if (estimator != Difference<DoubleNumbers>::kName && estimator != Foaw<DoubleNumbers>::kName) {
     text += ", " + estimator + " taken for a bare difference";

@@ -8,7 +8,8 @@
 
 // Whether a device can hold the contact of a scene: its stiffness and damping against the exact
 // boundary of a sampled wall (docs/theory.md 5.7), at the scene's rate, with the figures of its
-// device (controller/stability) and without a hand that damps it.
+// device (controller/stability), or those of `device.identified` across its worst direction, and
+// without a hand that damps it.
 //
 // The criterion is an oscillation that grows. It soon exceeds the 0.1 mm over which the coupling's
 // damper sets in, and the steps of the encoder. Then the damper acts fully, and the velocity window

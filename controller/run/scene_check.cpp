@@ -258,8 +258,11 @@ SceneSpec as_written(const LoadedScene& scene) {
 /// The input files of a scene.
 std::vector<fs::path> files_read(const ControllerOptions& options, const SceneSpec& scene) {
   const fs::path folder = fs::path(scene.path).parent_path();
-  std::vector<fs::path> files{scene.path, scene.hand_script};
-  if (scene.second) files.emplace_back(scene.second->hand_script);
+  std::vector<fs::path> files{scene.path, scene.hand_script, scene.device.identified};
+  if (scene.second) {
+    files.emplace_back(scene.second->hand_script);
+    files.emplace_back(scene.second->device.identified);
+  }
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     const bool from_command_line = v == 0 && options.overrides.volume_file;
     const fs::path file =
@@ -276,6 +279,12 @@ std::vector<fs::path> files_read(const ControllerOptions& options, const SceneSp
   return files;
 }
 
+/// For the emulator, if the scene names one.
+std::string identified_line(const char* arm, const LoadedScene& scene) {
+  if (!scene.identified) return {};
+  return std::string(arm) + "identified=" + scene.device.identified + "\n";
+}
+
 /// Highest speed of a free hand over a tooth; a lower limit is reported.
 constexpr double kHandSpeedMmPerS = 1000;
 
@@ -284,15 +293,16 @@ constexpr double kHandSpeedMmPerS = 1000;
 std::string hand_lines(const LoadedScene& scene) {
   char unit[64];
   std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
-  const std::string lines = "hand_unit_mm=" + std::string(unit) +
-                            "\nhand_script=" + scene.hand_script +
-                            "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
+  const std::string lines =
+      "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
+      "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n" + identified_line("", scene);
   if (!scene.second) return lines;
   const LoadedScene second = second_arm_of(scene);
   std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(second));
   return lines + "device=" + std::string(word_of(scene.device.personality)) +
          "\nsecond_device=" + std::string(word_of(second.device.personality)) +
-         "\nsecond_hand_unit_mm=" + unit + "\nsecond_hand_script=" + second.hand_script + "\n";
+         "\nsecond_hand_unit_mm=" + unit + "\nsecond_hand_script=" + second.hand_script + "\n" +
+         identified_line("second_", second);
 }
 
 std::string air_lines(const LoadedScene& scene, const SceneCosts& costs) {

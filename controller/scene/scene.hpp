@@ -136,6 +136,9 @@ struct DeviceSettings {
   /// In the hand at the start; if empty, the first tool, and of a second device the second.
   std::string first_tool;
   std::string tool_location;  ///< begins a complaint about it
+  /// A file of `kerf identify`, whose values stand in for those of the personality; relative to the
+  /// working directory, may be empty.
+  std::string identified;
 };
 
 /// [force]

@@ -270,10 +270,12 @@ Material& material_named(const SceneTable& table, const std::string& name,
   return material != materials.end() ? *material : materials.emplace_back(known_material(name));
 }
 
-void finish_device(const SceneTable& table, SceneSpec& scene) {
+void finish_device(const SceneTable& table, const std::filesystem::path& path, SceneSpec& scene) {
   // Without contact there is no surface to go to.
   scene.offset_given = table.has("offset_mm") || scene.force.model == ForceModel::external;
   if (table.has("first_tool")) scene.device.tool_location = table.location("first_tool");
+  std::string& identified = scene.device.identified;
+  if (!identified.empty()) identified = (path.parent_path() / identified).string();
   for (const double sign : scene.device.encoder_sign.value_or(std::array{1.0, 1.0, 1.0})) {
     if (std::abs(sign) == 1) continue;
     refuse(
@@ -523,7 +525,7 @@ SecondArm read_second_arm(const TomlNode& root, const std::filesystem::path& pat
            " is the scene's, and both hands have it; write it in the first "
            "[[device]] alone");
   }
-  finish_device(device, parts.scene);
+  finish_device(device, path, parts.scene);
   finish_hand(tables, path, parts.scene.hand_script, parts.scene.hand_location);
   return {.device = parts.scene.device,
           .offset_given = parts.scene.offset_given,
@@ -568,7 +570,7 @@ SceneSpec read_scene(const TomlNode& root, const TomlNode* second,
   refuse_empty(scene);
   choose_cut(tables.once("cut"), scene);
   for (const SceneTable& table : once) table.read_conditional(parts);
-  finish_device(tables.once("device"), scene);
+  finish_device(tables.once("device"), path, scene);
   if (second != nullptr) {
     scene.second = read_second_arm(*second, path, keys);
     scene.second->limits = scene.limits;

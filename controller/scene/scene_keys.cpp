@@ -264,6 +264,9 @@ constexpr SceneKey kKeys[] = {
     {"device.first_tool", "", at<&DeviceSettings::first_tool>, {},
      "name of the tool that it holds at the start; a command changes it",
      {}, {.default_text = "the first; of a second device the second", .json = InJson::if_changed}},
+    {"device.identified", "", at<&DeviceSettings::identified>, {},
+     "a device.toml of kerf identify, from the scene's folder: its mass, friction and delay in checks of gains and in the emulator (docs/identify.md)",
+     {}, {.default_text = "none", .json = InJson::never}},
 
     {"force.model", "", at<&ForceSettings::model>, one_of(kForceModelWords),
      "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients; external: a program gives it, and needs no volume and no tool (docs/external.md)"},

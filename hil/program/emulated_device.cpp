@@ -10,6 +10,8 @@
 #include "hil/device/emulator.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
+#include "hil/script/identified_plant.hpp"
+#include "shared/device/identified_device.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/wire/emulator_link.hpp"
 
@@ -38,9 +40,22 @@ FaultScript faults_of(const EmulatorOptions& o) {
   return script;
 }
 
-/// Sets the parameters that script and command line give.
-void take_plants(const EmulatorOptions& o, const PlantValues& of_script, PlantParams& params) {
+/// In lock-step the period is known; else that of the recording is taken.
+PlantValues identified_of(const EmulatorOptions& o) {
+  if (o.identified.empty()) return {};
+  try {
+    const IdentifiedDevice found = read_identified_device(o.identified);
+    return plant_of(found, o.lockstep ? o.rate_hz : found.rate_hz, o.identified);
+  } catch (const DeviceFileError& error) {
+    throw HilError(error.what());
+  }
+}
+
+/// Sets the parameters that script, identified device and command line give.
+void take_plants(const EmulatorOptions& o, const PlantValues& of_script,
+                 const PlantValues& of_identified, PlantParams& params) {
   take_plant(of_script, params);
+  take_plant(of_identified, params);
   take_plant(o.plant, params);
   if (params.mode_hz > 0 && params.joint_inertia_kg_m2[0] <= 0) {
     throw HilError("--mode-hz: without inertia nothing rings; give --joint-inertia, such as 1e-4");
@@ -82,9 +97,10 @@ void HandServer::lead(Emulator& emulator, int cycles) noexcept {
   emulator.release();
 }
 
-std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantValues& of_script) {
+std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantValues& of_script,
+                                         const PlantValues& of_identified) {
   return with_device_params(o.personality, [&](auto params) {
-    take_plants(o, of_script, params);
+    take_plants(o, of_script, of_identified, params);
     if constexpr (std::is_same_v<decltype(params), WoodenParams>) {
       params.packet_bytes = o.packet_bytes;
       params.wireless_button = o.wireless_button;
@@ -99,7 +115,10 @@ std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantVa
 }
 
 EmulatedDevice::EmulatedDevice(const EmulatorOptions& options)
-    : options_(options), hand_(hand_of(options)), faults_(faults_of(options)) {
+    : options_(options),
+      hand_(hand_of(options)),
+      identified_(identified_of(options)),
+      faults_(faults_of(options)) {
   if (!options_.hand_socket.empty()) leader_.emplace(options_.hand_socket);
   renew();
 }
@@ -115,7 +134,8 @@ void EmulatedDevice::renew() {
     withheld_ = withheld();
   }
   faulty_.reset();
-  emulator_.emplace(make_device(options_, hand_ ? hand_->plant : PlantValues{}), hand_);
+  emulator_.emplace(make_device(options_, hand_ ? hand_->plant : PlantValues{}, identified_),
+                    hand_);
   faulty_.emplace(*emulator_, faults_);
 }
 

@@ -45,10 +45,11 @@ class HandServer {
   std::uint64_t targets_ = 0, refused_ = 0;
 };
 
-/// The device model of the options; plant parameters that they leave out come from the hand script.
-/// Throws `HilError` for an impossible plant.
+/// The device model of the options; plant parameters that they leave out come from the identified
+/// device, then from the hand script. Throws `HilError` for an impossible plant.
 [[nodiscard]] std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& options,
-                                                       const PlantValues& of_script);
+                                                       const PlantValues& of_script,
+                                                       const PlantValues& of_identified = {});
 
 /// The emulated device with its hand and its faults. All three restart for each new client. One
 /// thread.
@@ -85,6 +86,7 @@ class EmulatedDevice final : public PacketDevice {
 
   const EmulatorOptions& options_;
   std::optional<HandScript> hand_;
+  PlantValues identified_;
   FaultScript faults_;
   std::optional<HandServer> leader_;
   std::optional<Emulator> emulator_;

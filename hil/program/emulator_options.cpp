@@ -249,6 +249,9 @@ void declare(Arguments& app, EmulatorOptions& o) {
              "path of a socket at which a window (kerf-visualizer --hand-socket) leads the hand, "
              "in place of a script");
   app.option("--fault", o.fault, "fault script (TOML), for example hil/faults/late_reports.toml");
+  app.option("--identified", o.identified,
+             "device.toml of kerf identify: its mean mass and friction, and its delay, in place of "
+             "those of the hand script and of the device");
   app.option("--unit-mm", o.unit_mm,
              "device mm per unit of a hand script without unit_mm (default: 1)")
       .within(1e-3, 100.0);

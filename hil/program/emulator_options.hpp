@@ -64,6 +64,7 @@ struct EmulatorOptions {
   std::string hand;
   std::string hand_socket;
   std::string fault;
+  std::string identified;
   std::optional<double> unit_mm;
   bool lockstep = false;
   int rate_hz = 1000;

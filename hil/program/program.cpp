@@ -58,7 +58,8 @@ Json injected_list(const std::vector<InjectedFault>& faults) {
 /// Throws FileError now if the report could not be written after the run, or would replace a file
 /// that the run reads.
 void check_report(const EmulatorOptions& options) {
-  check_outputs({options.hand, options.fault}, {{"--report", options.report, ".json"}});
+  check_outputs({options.hand, options.fault, options.identified},
+                {{"--report", options.report, ".json"}});
 }
 
 /// Writes the figures of a run as JSON: under another name first, then renamed, so the file is

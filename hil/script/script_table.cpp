@@ -2,23 +2,14 @@
 #include "hil/script/script_table.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <fstream>
-#include <ios>
-#include <system_error>
 #include <utility>
 
 #include "hil/hil_error.hpp"
-#include "shared/posix/error_text.hpp"
+#include "shared/posix/input_file.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
-namespace {
-
-constexpr std::size_t kMaxBytes = 1 << 20;
-
-}  // namespace
 
 ScriptTable::ScriptTable(const TomlNode& node, std::string location, std::string name)
     : node_(node), location_(std::move(location)), name_(std::move(name)) {}
@@ -120,25 +111,11 @@ TomlNode parse_script(std::string_view text, const std::string& location) {
 }
 
 std::string read_script(const std::filesystem::path& file, const std::string& example) {
-  const std::string location = file.string();
-  std::error_code error;
-  if (const std::string why = access_error(file); !why.empty()) throw HilError(location + why);
-  if (!std::filesystem::is_regular_file(file, error)) {
-    throw HilError(location + ": not a file; name one such as " + example);
+  try {
+    return read_input_file(file, example);
+  } catch (const InputFileError& error) {
+    throw HilError(error.what());
   }
-  std::ifstream in(file, std::ios::binary);
-  if (!in) {
-    throw HilError(location + ": " + std::generic_category().message(errno) + "; " +
-                   remedy_for(errno, "check its rights"));
-  }
-  std::string text(kMaxBytes + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (in.bad() || (!in.eof() && text.size() <= kMaxBytes)) {
-    throw HilError(location + ": cannot be read; check its rights");
-  }
-  if (text.size() > kMaxBytes) throw HilError(location + ": more than 1 MiB; use a shorter one");
-  return text;
 }
 
 }  // namespace kerf

@@ -61,9 +61,11 @@ inline constexpr double kMaxDelayPeriods = 64;
 [[nodiscard]] std::string problem_in(const SampledLoop& loop);
 
 /// The loop of a device ("omni", "falcon", "woodenhaptics", "inverse3", "touch", "omega") by the
-/// figures of docs/devices.md, without a hand: a light grip is the worst case. Throws Error for
-/// another name or a rate that is not positive.
-[[nodiscard]] SampledLoop device_loop(std::string_view device, double rate_hz);
+/// figures of docs/devices.md, without a hand: a light grip is the worst case. Or of a file of
+/// `kerf identify`, whose name ends in .toml, in a direction: MapOptions. Throws Error for another
+/// name, a file that is no device, or a rate that is not positive.
+[[nodiscard]] SampledLoop device_loop(std::string_view device, double rate_hz,
+                                      std::string_view direction = {});
 
 // Limits of the gains of a sampled wall (docs/theory.md 5.7).
 //
@@ -164,7 +166,7 @@ using WallWatch = std::function<void(double tip_mm, double mm_per_s)>;
 [[nodiscard]] LimitCycle run_on_wall(const WallRun& run, const WallWatch& watch);
 
 /// An axis of a map and its values, as the options of `kerf lab zwidth`: {"device", "omni,falcon"},
-/// {"damping", "0:0.02:5"} (from:to:count).
+/// or one file as {"device", "device.toml"}; {"damping", "0:0.02:5"} (from:to:count).
 struct MapAxis {
   std::string name, values;
 };
@@ -194,6 +196,9 @@ struct MapOptions {
   std::size_t threads = 0;  ///< 0: one for each core; the map is the same
   /// Ends the map when another thread sets it: columns that are not done then have no cells.
   const std::atomic<bool>* stop = nullptr;
+  /// Of a device that is a file: "x", "y", "z", such as "1,0,1", or "worst", as if empty, the one
+  /// of 13 with the lowest boundary.
+  std::string direction{};
 };
 
 /// The map of `kerf lab zwidth`, whose options are the axes: `kerf lab zwidth --help` lists names
@@ -204,7 +209,8 @@ struct MapOptions {
                                          const MapOptions& options = {});
 
 /// The loop of a column: `axes` have one value each, the other ones their standards. So it has the
-/// figures of the emulated device, as maps have. Throws Error.
-[[nodiscard]] SampledLoop column_loop(const std::vector<MapAxis>& axes);
+/// figures of the emulated device, as maps have. `direction`: MapOptions. Throws Error.
+[[nodiscard]] SampledLoop column_loop(const std::vector<MapAxis>& axes,
+                                      std::string_view direction = {});
 
 }  // namespace kerf

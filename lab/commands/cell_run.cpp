@@ -338,10 +338,15 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   Lines told = lines_of(text_in(folder / "told"));
   std::string& hand = told["hand_script"];
   if (hand.empty()) hand = find_data_file("scenes/hands/cut_cavity.toml");  // as the demo
-  Child device(emulator(job, {"--front", "socket", "--socket", at("device"), "--hand", hand,
-                              "--unit-mm", told["hand_unit_mm"], "--lockstep", "--rate",
-                              told["rate_hz"], "--report", at("emulator.json")}),
-               folder / "emulator");
+  std::vector<std::string> words{
+      "--front",          "socket", "--socket",      at("device"),
+      "--hand",           hand,     "--unit-mm",     told["hand_unit_mm"],
+      "--lockstep",       "--rate", told["rate_hz"], "--report",
+      at("emulator.json")};
+  if (const std::string identified = told["identified"]; !identified.empty()) {
+    words.insert(words.end(), {"--identified", identified});
+  }
+  Child device(emulator(job, words), folder / "emulator");
   const auto end = Clock::now() + kLongestRun;
   while (!controller.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {
     if (stop) return std::nullopt;

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
+import os
 
 import numpy as np
 
@@ -35,19 +36,21 @@ class Map:
     impossible: np.ndarray
 
 
-def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, **axes):
+def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, direction="", **axes):
     """A map of which walls rest on a device: `kerf lab zwidth` with the same bits and speed, as arrays.
 
     stiffness: N/mm, "0.05:50:40" (from:to:count, even in the ratio), or numbers. axes: the options of `kerf lab zwidth --help` by
     their names: device, damping (N s/mm), rate (Hz), delay (periods), mass (kg), law, estimator and so on; each a value, a list or
     array, or "from:to:count". The device is an emulated one, with a delay of one period unless `delay` says otherwise: map_loop has
-    its figures. It may also be one of touch, omega and inverse3, alone. seeds: so many of the encoders' steps against the wall, from
+    its figures. It may also be one of touch, omega and inverse3, alone, or one device.toml of kerf identify, across `direction`: "x",
+    "y", "z", such as "1,0,1", or "worst", as if it is empty: the one of 13 with the lowest boundary. seeds: so many of the encoders' steps against the wall, from
     `seed` on. seconds: to which a run that is still open is followed, at least. threads: 0
     for all cores; the map is the same. Returns a kerf.Map. Takes seconds to hours (docs/stability.md); Ctrl-C raises
     kerf.Interrupted with the Map of the columns that are done. Raises kerf.Error."""
+    axes = _with_paths(axes)
     figures = _device_by_its_figures(axes)
     given = [(name, _text(name, value)) for name, value in figures.items()]
-    measured, ended = _kerf.map_of(_text("stiffness", stiffness), given, seconds, seed, seeds, threads)
+    measured, ended = _kerf.map_of(_text("stiffness", stiffness), given, seconds, seed, seeds, threads, direction)
     named = {"device": axes["device"]} if figures is not axes else {}
     made = _map_of(measured, list(axes), [{**dict(zip(figures, column.values)), **named} for column in measured.columns])
     if ended:
@@ -55,10 +58,16 @@ def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, **axes):
     return made
 
 
+def _with_paths(axes):
+    """A file may be given as a pathlib.Path."""
+    return {name: os.fspath(value) if isinstance(value, os.PathLike) else value for name, value in axes.items()}
+
+
 def _device_by_its_figures(axes):
-    """The axis `device` of the lab knows three arms. A Touch has the Omni's; of the others the lab has to be given what differs."""
+    """The axis `device` of the lab knows three arms and files. A Touch has the Omni's; of the others the lab has to be given what
+    differs."""
     device = axes.get("device")
-    if not isinstance(device, str) or "," in device or device in DEVICES_OF_MAPS:
+    if not isinstance(device, str) or "," in device or device in DEVICES_OF_MAPS or device.endswith(".toml"):
         return axes
     if device == "touch":
         return {**axes, "device": "omni"}
@@ -67,13 +76,13 @@ def _device_by_its_figures(axes):
     return {**figures, **{name: value for name, value in axes.items() if name != "device"}}
 
 
-def map_loop(device, rate_hz=1000.0):
+def map_loop(device, rate_hz=1000.0, direction=""):
     """The kerf.SampledLoop that zwidth and cell have for a device: of the emulated arm, with a delay of one period.
 
     kerf.highest_stiffness(map_loop(device), damping) is the linear boundary of that map. kerf.device_loop is for a unit: with the
-    2 ms of its bus, which are assumed until somebody measures them, and the least damping. rate_hz: of the servo. Raises kerf.Error."""
-    axes = _device_by_its_figures({"device": device, "rate": rate_hz})
-    return _kerf.column_loop([(name, _text(name, value)) for name, value in axes.items()])
+    2 ms of its bus, which are assumed until somebody measures them, and the least damping. rate_hz: of the servo. Of a device.toml both are the loop that was identified, across `direction` as of zwidth. Raises kerf.Error."""
+    axes = _device_by_its_figures(_with_paths({"device": device, "rate": rate_hz}))
+    return _kerf.column_loop([(name, _text(name, value)) for name, value in axes.items()], direction)
 
 
 def _text(name, values):

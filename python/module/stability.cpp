@@ -33,10 +33,10 @@ std::vector<MapAxis> axes_of(const AxisTexts& texts) {
 /// columns without cells were not measured.
 std::pair<StabilityMap, bool> map_of(const std::string& stiffness, const AxisTexts& axes,
                                      double seconds, std::uint64_t seed, std::size_t seeds,
-                                     std::size_t threads) {
+                                     std::size_t threads, const std::string& direction) {
   const std::vector<MapAxis> all = axes_of(axes);
   std::atomic<bool> stop{false};
-  const MapOptions options{seconds, seed, seeds, threads, &stop};
+  const MapOptions options{seconds, seed, seeds, threads, &stop, direction};
   auto measured =
       std::async(std::launch::async, [&] { return stability_map(stiffness, all, options); });
   constexpr std::chrono::milliseconds kBetweenSignals{20};
@@ -115,10 +115,11 @@ void define_stability(py::module_& module) {
       .def_readwrite("hand", &SampledLoop::hand)
       .def_readwrite("coulomb_n", &SampledLoop::coulomb_n, "Coulomb friction at the tip, N")
       .def_readwrite("quantum_mm", &SampledLoop::quantum_mm, "of the encoders, at the tip");
-  module.def(
-      "device_loop", &device_loop, py::arg("device"), py::arg("rate_hz") = 1000.0,
-      "The SampledLoop of a unit of a device by the figures of docs/devices.md, without a "
-      "hand: with the assumed delay of 2 ms of its bus. map_loop is that of the emulated one.");
+  module.def("device_loop", &device_loop, py::arg("device"), py::arg("rate_hz") = 1000.0,
+             py::arg("direction") = "",
+             "The SampledLoop of a unit of a device by the figures of docs/devices.md, without a "
+             "hand: with the assumed delay of 2 ms of its bus. map_loop is that of the emulated "
+             "one. Or of a device.toml of kerf identify, in a direction as of zwidth.");
 
   const auto sound = [](const SampledLoop& loop) {
     if (const std::string problem = problem_in(loop); !problem.empty()) throw Error(problem);
@@ -205,7 +206,9 @@ void define_stability(py::module_& module) {
       .def_readonly("stiffness_n_per_mm", &StabilityMap::stiffness_n_per_mm)
       .def_readonly("columns", &StabilityMap::columns);
   module.def("map_of", &map_of);
-  module.def("column_loop", [](const AxisTexts& axes) { return column_loop(axes_of(axes)); });
+  module.def("column_loop", [](const AxisTexts& axes, const std::string& direction) {
+    return column_loop(axes_of(axes), direction);
+  });
   module.def("cell_of", &cell_of);
 }
 

@@ -46,6 +46,7 @@ def run(bin_folder, out, scene, seconds, devices=("omni",), settings=(), faults=
             which = ("", "second_")[arm]
             start(*program("emulator"), "--personality", device, "--socket", out / f"device-{arm}", "--lockstep",
                   "--rate", words["rate_hz"], "--unit-mm", words[which + "hand_unit_mm"], "--hand", words[which + "hand_script"],
+                  *(["--identified", words[which + "identified"]] if which + "identified" in words else []),
                   *(["--fault", faults[arm]] if faults[arm] else []))
         codes = [process.wait(PATIENCE_S) for process in (controller, recorder)]
         if any(codes[1:]) or codes[0] not in (0, 1) or not (out / "report.json").exists():

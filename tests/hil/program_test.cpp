@@ -65,6 +65,8 @@ TEST_CASE("bad input is one line that names location, value and way out, and exi
            Bad{"--socket $/s --reset-stops-stream", "--reset-stops-stream"},
            Bad{"--socket $/s --udp 5000", "--udp: front socket"},
            Bad{"--socket $/s --mode-hz 80", "--mode-hz"},
+           Bad{"--socket $/s --identified $/no.toml", "no.toml: not a file"},
+           Bad{"--socket $/s --identified $", ": not a file"},
            Bad{"--socket $/s --joint-inertia -1", "--joint-inertia"},
            Bad{"--socket $/s --tip-mass 0", "--tip-mass"},
            Bad{"--socket $/s --hand-mass nan", "--hand-mass"},

@@ -7,31 +7,28 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/hil_error.hpp"
 #include "shared/text/text.hpp"
 #include "tests/lab/lab_line.hpp"
+#include "tests/support/identified_device.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace {
 
+using kerf::along;
+using kerf::IdentifiedDevice;
+using kerf::read_identified_device;
+using kerf::test::device_file_with;
+using kerf::test::kDeviceFile;
 using kerf::test::lab;
 using kerf::test::LabAnswer;
 using kerf::test::TemporaryFolder;
 using kerf::test::text_of;
-using kerf::zwidth::along;
 using kerf::zwidth::direction_of;
-using kerf::zwidth::IdentifiedDevice;
-using kerf::zwidth::read_device;
-
-const std::string kWhole =
-    "[device]\nmass_kg = [0.032, 0.053, 0.077, 0.01, -0.022, 0.005]\n"
-    "viscous_ns_per_mm = [0.0004, 0.0005, 0.0006]\ncoulomb_n = [0.1, 0.2, 0.3]\n"
-    "quantum_mm = [0.03, 0.03, 0.04]\ndelay_s = 0.0018\nrate_hz = 1000\n[low]\n[high]\n[fit]\n";
 
 std::string refusal_of(const std::string& file) {
   try {
-    static_cast<void>(read_device(file));
-  } catch (const kerf::HilError& error) {
+    static_cast<void>(read_identified_device(file));
+  } catch (const kerf::DeviceFileError& error) {
     return error.what();
   }
   return {};
@@ -41,7 +38,7 @@ std::string refusal_of(const std::string& file) {
 
 TEST_CASE("an identified device has in each direction the mass that a wall there moves") {
   const TemporaryFolder folder;
-  const IdentifiedDevice device = read_device(folder.write("device.toml", kWhole));
+  const IdentifiedDevice device = read_identified_device(folder.write("device.toml", kDeviceFile));
   CHECK(device.mass_kg[0][2] == -0.022);
   CHECK(device.mass_kg[2][0] == -0.022);
   CHECK(device.delay_s == 0.0018);
@@ -67,8 +64,8 @@ TEST_CASE("an identified device has in each direction the mass that a wall there
 
 TEST_CASE("the worst direction has the lowest boundary of all that are tried") {
   const TemporaryFolder folder;
-  const IdentifiedDevice device = read_device(folder.write("device.toml", kWhole));
-  const auto boundary = [&](const kerf::zwidth::DeviceDirection& at) {
+  const IdentifiedDevice device = read_identified_device(folder.write("device.toml", kDeviceFile));
+  const auto boundary = [&](const kerf::DeviceDirection& at) {
     kerf::SampledLoop loop;
     loop.mass_kg = at.mass_kg;
     loop.viscous_ns_per_mm = at.viscous_ns_per_mm;
@@ -84,8 +81,8 @@ TEST_CASE("the worst direction has the lowest boundary of all that are tried") {
 
 TEST_CASE("a map of a file is that of its figures as options") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("device.toml", kWhole);
-  const auto z = along(read_device(file), {0, 0, 1});
+  const std::string file = folder.write("device.toml", kDeviceFile);
+  const auto z = along(read_identified_device(file), {0, 0, 1});
   const std::string map = "zwidth --damping 0,0.002 --stiffness 0.5:5:4 --seeds 1 --csv ";
   const LabAnswer by_file =
       lab(map + (folder / "file.csv").string() + " --direction z --device " + file);
@@ -101,9 +98,7 @@ TEST_CASE("a map of a file is that of its figures as options") {
 TEST_CASE("a file that is no device, and options against it, get one line") {
   const TemporaryFolder folder;
   const auto with = [&](const std::string& from, const std::string& to) {
-    std::string text = kWhole;
-    text.replace(text.find(from), from.size(), to);
-    return refusal_of(folder.write("device.toml", text));
+    return refusal_of(folder.write("device.toml", device_file_with(from, to)));
   };
   CHECK(with("[device]", "[devices]").find("no table [device]") != std::string::npos);
   CHECK(with("mass_kg = [0.032", "# mass_kg = [0.032").find("has no mass_kg") != std::string::npos);
@@ -113,8 +108,18 @@ TEST_CASE("a file that is no device, and options against it, get one line") {
   CHECK(with("0.1, 0.2", "0.1, -0.2").find("out of range") != std::string::npos);
   CHECK(with("0.0018", "nan").find("out of range") != std::string::npos);
   CHECK(with("rate_hz", "rate").find("unknown key") != std::string::npos);
+  CHECK(with("= 0.0018", "= 0.064").find("device.toml:6: device.delay_s = 0.064 is 64 periods") !=
+        std::string::npos);
+  CHECK(with("[0.0003, -0.0001, 0.0005]", "\"x\"").find("low.viscous_ns_per_mm: not a list") !=
+        std::string::npos);
+  CHECK(with("[device]", "device = 3 #").find("device: not a table") != std::string::npos);
+  CHECK(with("[device]", "[device").find("device.toml:1: ") != std::string::npos);
+  CHECK(refusal_of(folder.write("device.toml", "")).find("no table [device]") != std::string::npos);
+  CHECK(refusal_of(folder.path().string()).find("not a file") != std::string::npos);
+  CHECK(refusal_of(folder.write("device.toml", std::string(1 << 20, '#') + "#")) ==
+        (folder / "device.toml").string() + ": more than 1 MiB; use a shorter one");
 
-  const std::string file = folder.write("device.toml", kWhole);
+  const std::string file = folder.write("device.toml", kDeviceFile);
   for (const auto& [words, line] :
        {std::pair{"--direction z", "--direction: is that of a file"},
         std::pair{"--direction 0,0,0 --device FILE", "--direction: 0,0,0: no direction"},

@@ -13,9 +13,13 @@
 
 #include "controller/law/law.hpp"
 #include "controller/load/load_scene.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/stability/identified_loop.hpp"
 #include "controller/stability/sampled_loop.hpp"
 #include "tests/servo/support.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/identified_device.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -319,4 +323,55 @@ TEST_CASE("a filter of the velocity costs margin, and what is not counted is tol
   CHECK(gain_lines(scene, linear(scene))
             .find("delay 2 ms, mine taken for a bare difference, without what passivity does\n") !=
         std::string::npos);
+}
+
+TEST_CASE("an identified device takes the place of its figures, as unfavourable as its intervals") {
+  const TemporaryFolder folder;
+  const std::string text = "[force]\nmodel = \"external\"\nstiffness_n_per_mm = 0.1\n[device]\n";
+  const auto load = [&](const std::string& lines) {
+    return load_scene(folder.write("scene.toml", text + lines));
+  };
+  static_cast<void>(folder.write("device.toml", kDeviceFile));
+  const std::string named = "identified = \"device.toml\"\n";
+  const LoadedScene scene = load(named);
+  const GainMargin margin = gain_margin(scene);
+  // The lowest of the directions has their least friction, and the longest delay.
+  const IdentifiedDevice device = parse_identified_device(kDeviceFile, "device.toml");
+  const DeviceDirection worst = worst_direction(device, scene.force.damping_ns_per_mm, 1000);
+  SampledLoop loop;
+  loop.mass_kg = worst.mass_kg;
+  loop.viscous_ns_per_mm = worst.along[0] * worst.along[0] * 0.0003 +
+                           worst.along[2] * worst.along[2] * 0.0005;  // -0.0001 is none
+  loop.delay_s = 0.0019;
+  CHECK(margin.highest_n_per_mm ==
+        doctest::Approx(highest_stiffness(loop, scene.force.damping_ns_per_mm)).epsilon(1e-9));
+  CHECK(margin.highest_n_per_mm != gain_margin(load("")).highest_n_per_mm);
+  CHECK(has(gain_lines(scene, margin), "delay 1.9 ms, identified\n"));
+  // It changes no tick, so no hash; and a replay does without the file.
+  CHECK(canonical_json(scene) == canonical_json(load("")));
+  std::filesystem::remove(folder / "device.toml");
+  CHECK(has(error_of([&] { static_cast<void>(load(named)); }), "device.toml: not a file"));
+  CHECK_FALSE(load_scene(folder / "scene.toml", text + named, {}, {.without_device_file = true})
+                  .identified);
+  // Of another device it is none.
+  CHECK(has(error_of([&] {
+              static_cast<void>(
+                  load_scene(folder / "scene.toml", {.personality = Personality::falcon}));
+            }),
+            "--device falcon: the scene's device.identified is of its omni; "));
+  static_cast<void>(folder.write("device.toml", device_file_with("0.0018", "0.0081")));
+  CHECK(error_of([&] { static_cast<void>(load(named + "[servo]\nrate_hz = 8000\n")); }) ==
+        (folder / "device.toml").string() +
+            ": device.delay_s is 64 periods and more at servo.rate_hz = 8000; lower the rate");
+}
+
+TEST_CASE("each of two arms has the identified device that it names") {
+  const TemporaryFolder folder;
+  static_cast<void>(folder.write("device.toml", kDeviceFile));
+  const LoadedScene scene =
+      load_scene(folder.write("scene.toml",
+                              "[force]\nmodel = \"external\"\n[[device]]\n[[device]]\n"
+                              "identified = \"device.toml\"\n"));
+  CHECK_FALSE(scene.identified);
+  CHECK(second_arm_of(scene).identified);
 }

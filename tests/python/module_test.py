@@ -46,8 +46,6 @@ class Case(unittest.TestCase):
         self.assertIn(words, line)
         return caught.exception
 
-
-class TestRuns(Case):
     def same_as_programs(self, name, devices=("omni",), faults=None, **tables):
         scene = ROOT / "scenes" / f"{name}.toml"
         settings = [f"{table}.{key}={json.dumps(value)}" for table, keys in tables.items() for key, value in keys.items()]
@@ -56,7 +54,7 @@ class TestRuns(Case):
         report = lockstep.run(BIN, out, scene, 1.5, devices, settings, faults)
         log = kerf.Log(out / "log")
         if len(devices) == 1:
-            tables = {**tables, "device": {"personality": devices[0]}}
+            tables = {**tables, "device": {**tables.get("device", {}), "personality": devices[0]}}
         loop = kerf.Loop(kerf.Scene(name, **tables), faults=faults[0])
         rows = loop.run(ticks=len(log))
         theirs = log.ticks if log.second is None else np.stack([log.ticks, log.second], axis=1)
@@ -72,6 +70,8 @@ class TestRuns(Case):
             self.assertEqual(loop.volume().tobytes(), data)
         return report
 
+
+class TestRuns(Case):
     def test_each_row_is_that_of_the_programs(self):
         self.same_as_programs("touch", force={"stiffness_n_per_mm": 0.6})
         self.same_as_programs("phantom")
@@ -343,6 +343,55 @@ class TestMaps(Case):
         self.refused("nonsense", kerf.zwidth, nonsense=1, stiffness=1)
         self.refused("stiffness", kerf.zwidth, device="omni", stiffness=-1)
         self.refused("damping_ns_per_mm = -1", kerf.cell, 1, -1)
+
+
+class TestIdentified(Case):
+    """A device.toml of kerf identify, in place of a device's name."""
+
+    def setUp(self):
+        super().setUp()
+        self.file = self.home / "device.toml"
+        self.file.write_text("[device]\nmass_kg = [0.15, 0.2, 0.3, 0.01, 0, 0.02]\nviscous_ns_per_mm = [0.0008, 0.001, 0.0012]\n"
+                             "coulomb_n = [0.1, 0.15, 0.2]\nquantum_mm = [0.01, 0.01, 0.02]\ndelay_s = 0.0015\nrate_hz = 1000\n")
+
+    def test_its_map_is_that_of_the_lab(self):
+        made = kerf.zwidth(device=self.file, direction="z", stiffness="0.5:30:6", damping=[0, 0.004], seeds=1)
+        self.assertEqual(made.axes, {"device": [str(self.file)], "damping": ["0", "0.004"]})
+        out = self.home / "map.json"
+        subprocess.run([BIN / "kerf-lab", "zwidth", "--device", self.file, "--direction", "z", "--stiffness", "0.5:30:6", "--damping", "0,0.004",
+                        "--seeds", "1", "--json", out], check=True, capture_output=True)
+        theirs = [next(column for column in json.loads(out.read_text())["columns"] if column["axes"]["damping_ns_per_mm"] == damping)
+                  for damping in ("0", "0.004")]
+        self.assertEqual([[cell["swings"] for cell in column["cells"]] for column in theirs], made.swings[0].tolist())
+        self.assertEqual([column["by_travel"]["first_n_per_mm"] or np.inf for column in theirs], made.first_swing_n_per_mm[0].tolist())
+        # Across z alone: 1 / (M^-1)zz.
+        mass = np.array([[0.15, 0.01, 0], [0.01, 0.2, 0.02], [0, 0.02, 0.3]])
+        for loop in (kerf.map_loop(self.file, direction="z"), kerf.device_loop(str(self.file), direction="0,0,1")):
+            self.assertAlmostEqual(loop.mass_kg, 1 / np.linalg.inv(mass)[2, 2], places=6)
+            self.assertAlmostEqual(loop.delay_s, 0.0015)
+        worst = kerf.highest_stiffness(kerf.map_loop(self.file), 0.002)
+        self.assertLessEqual(worst, min(kerf.highest_stiffness(kerf.map_loop(self.file, direction=axis), 0.002) for axis in "xyz"))
+
+    def test_a_scene_that_names_it_is_emulated_so_and_its_log_needs_no_file(self):
+        device = {"identified": str(self.file)}
+        self.same_as_programs("touch", device=device)
+        log = self.home / "run"
+        with kerf.Loop(kerf.Scene("touch", device=device), log=log) as loop:
+            loop.run(seconds=1)
+            rows = loop.ticks.copy()
+        self.assertFalse(np.array_equal(rows["position_mm"], kerf.Loop("touch").run(seconds=1)["position_mm"]))
+        self.file.unlink()
+        self.assertIsNone(kerf.replay(log).difference)
+
+    def test_what_is_none_is_one_line(self):
+        self.refused("direction: z: is that of a file", kerf.zwidth, device="omni", direction="z", stiffness=1)
+        self.refused("up: no direction", kerf.zwidth, device=self.file, direction="up", stiffness=1)
+        self.refused("no.toml: not a file", kerf.zwidth, device="no.toml", stiffness=1)
+        self.refused("give one file alone", kerf.zwidth, device=["omni", "no.toml"], stiffness=1)
+        self.refused("not a file", kerf.Scene, "touch", device={"identified": str(self.home)})
+        self.file.write_text("")
+        self.refused("no table [device]", kerf.Scene, "touch", device={"identified": str(self.file)})
+        self.refused("no table [device]", kerf.device_loop, str(self.file))
 
 
 class TestArguments(Case):

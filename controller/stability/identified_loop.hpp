@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "include/kerf/stability.hpp"
+#include "shared/device/identified_device.hpp"
+
+// The loop of an identified device on a virtual wall (include/kerf/stability.hpp).
+
+namespace kerf {
+
+/// The loop across `direction`, without a hand. With `at_worst` friction and delay are the
+/// unfavourable ends of their intervals, for checks; the mass is as found: its interval moves a
+/// boundary less than these do.
+[[nodiscard]] SampledLoop loop_along(const IdentifiedDevice& device,
+                                     const DeviceDirection& direction, double rate_hz,
+                                     bool at_worst);
+
+/// Of the 13 axes and diagonals of a cube that with the lowest exact linear boundary at this
+/// damping and rate. Load time.
+[[nodiscard]] DeviceDirection worst_direction(const IdentifiedDevice& device,
+                                              double damping_ns_per_mm, double rate_hz);
+
+}  // namespace kerf
