@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./kerf identify`: mass, friction, delay, quantum and mode of a device, from a recording of its motion (docs/identify.md).
+"""`./kerf identify`: mass, friction, delay, quantum and mode of a device, from a recording of its motion, or from a motion that it
+makes itself (docs/identify.md).
 
-    python3 identify FOLDER_OF_KERF --log DIR [--out FILE]
+    python3 identify FOLDER_OF_KERF FOLDER_OF_PROGRAMS --log DIR [--out FILE]
+    python3 identify FOLDER_OF_KERF FOLDER_OF_PROGRAMS --scene SCENE [--device NAME] [--port PORT] [--log DIR] [--out FILE]
 
-Exit codes: 0 fine; 1 the log does not have them; 2 bad input or set-up; 130 interrupted."""
+Exit codes: 0 fine; 1 the log does not have them, or the motion ended early; 2 bad input or set-up; 130 interrupted."""
 import argparse
 import os
 import sys
@@ -39,27 +41,66 @@ def _umask():
 
 def _options(words):
     parser = _Words(prog="kerf identify", add_help=False, allow_abbrev=False)
-    parser.add_argument("--log")
+    for option in ("--log", "--scene", "--device", "--port"):
+        parser.add_argument(option)
     parser.add_argument("--out", default="device.toml")
     options = parser.parse_args(words)
-    if not options.log:
-        raise Refusal("no --log: give the folder of a recording; docs/identify.md says how to make one")
     if not options.out.endswith(".toml"):
         raise Refusal(f"--out {options.out}: is no .toml; name it so, for kerf lab zwidth --device")
+    if options.scene:
+        options.log = options.log or options.out.removesuffix(".toml") + ".log"
+        return options
+    if not options.log:
+        raise Refusal("no --scene and no --log: give a scene to move its device, such as external, or the folder of a recording")
+    for option in ("device", "port"):
+        if getattr(options, option):
+            raise Refusal(f"--{option}: is of a device that moves; give --scene too, or leave it out")
     return options
 
 
-def run(root, words):
-    options = _options(words)
+def _find_scene(root, name):
+    """The file of that name; else that of kerf's own scenes, with or without the ending."""
+    shipped = os.path.join(root, "scenes", name)
+    return next((path for path in (name, shipped, shipped + ".toml") if os.path.isfile(path)), name)
+
+
+def _need(root, moves):
+    """NumPy, the reader of logs, and for a motion `import kerf`: of the clone, if it was built there."""
     sys.path.append(os.path.join(root, "python"))
     try:
         import numpy  # noqa: F401
         import kerf_reader  # noqa: F401
     except ImportError as error:
         raise Refusal(f"python3: no {error.name}; install the package python3-{'numpy' if error.name == 'numpy' else 'kerf'}") from None
+    if not moves:
+        return
+    # The sources' own folder `kerf` has no module in it.
+    sys.path[:] = [os.path.join(root, "build", "python", "python"), *(path for path in sys.path if path != os.path.join(root, "python"))]
+    try:
+        import kerf  # noqa: F401
+    except ImportError:
+        build = "in a clone: cmake --preset python && cmake --build --preset python --target kerf_python"
+        raise Refusal(f"python3: no module kerf, by which the device is moved; install python3-kerf, or {build} (docs/python.md)") from None
+
+
+def run(root, binaries, words):
+    options = _options(words)
+    _need(root, bool(options.scene))
     import device_file
     import estimate
     import log_motion
+    if options.scene:
+        import guided
+        options.scene = _find_scene(root, options.scene)
+        if os.path.lexists(options.log):
+            raise Refusal(f"--log {options.log}: is there already; name a new folder, or identify from it: leave --scene out")
+        try:
+            guided.record(binaries, options)
+        except guided.Refused as error:
+            raise Refusal(str(error)) from None
+        except guided.Stopped as error:
+            kept = f"; what was recorded is in {options.log}: kerf identify --log {options.log}" if os.path.isdir(options.log) else ""
+            raise estimate.NoEstimate(f"{error}{kept}") from None
     try:
         motion, lines = log_motion.read(options.log)
     except (ValueError, KeyError, OSError) as error:
@@ -75,7 +116,7 @@ def run(root, words):
 
 def main():
     try:
-        run(sys.argv[1], sys.argv[2:])
+        run(sys.argv[1], sys.argv[2], sys.argv[3:])
         code = 0
     except KeyboardInterrupt:
         code = 130

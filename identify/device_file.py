@@ -66,6 +66,10 @@ def remarks(found):
         yield f"{', '.join(missing)} did not move by 20 steps of the encoder: nothing is known of it; free it, or give it more force"
     for begin, end in found.spoilt:
         yield f"{begin:.1f} to {end:.1f} s is left out: something else moved the tip, as a hand or a knock does"
+    if found.slips:
+        at, axes, size = found.slips[0]
+        more = f"; {len(found.slips) - 1} more follow" if len(found.slips) > 1 else ""
+        yield f"a slip at {at:.2f} s: {', '.join(axes)} jumped by {size:.2g} mm in one tick, which no force explains{more}; left out"
     for one, other, correlation in found.together:
         yield f"{one} and {other} cannot be told apart here (correlation {correlation:+.2f}): each interval has the other in it"
     for name, value, low, high in zip(NAMES, found.values, found.low, found.high):

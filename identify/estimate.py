@@ -27,6 +27,8 @@ REPLICATES = 400
 TRIMMED = 4.0          # usual sizes of a residual: beyond them lies a reversal that the model got wrong; at most 7 % of all rows
 SPOILT = 0.3           # of the force of a block unexplained: something outside of the arm; of all of it: no arm of this model
 POOR = 0.01            # of the force unexplained: worth a look at friction against the motion as a whole,
+FINEST_M = 1e-7        # steps below it are those of the servo's numbers, 15 nm
+SLIP, NEAR = 6.0, 20   # a slip is so many times what the ticks near it are off, and so many steps of the encoder
 BETTER = 0.8           # which has to leave clearly less
 # Half widths below which no interval is stated, as parts of the value (of the delay: periods): what reversals that are a part of a
 # tick off leave, which no bootstrap shows. From the emulated arms of tests/identify/study.py.
@@ -60,6 +62,7 @@ class Estimate:
     whiteness: np.ndarray  # p of Ljung and Box, by axis
     together: list         # (name, name, correlation) of what the log cannot tell apart
     spoilt: list           # (from_s, to_s) left out: a hand, a knock
+    slips: list            # (at_s, axes, mm of the largest): jumps of the positions that no force explains
     seconds: float         # of moving axes that were used
 
     @property
@@ -70,7 +73,7 @@ class Estimate:
 def quantum_of(place):
     """The common step of an axis' positions; 0 if they have none. Of joint encoders, whose steps vary: that with their noise."""
     steps = np.abs(np.diff(place))
-    steps = steps[steps > 1e-9]
+    steps = steps[steps > FINEST_M]
     if len(steps) < 20:
         return 0.0
     step = np.quantile(steps, 0.02)
@@ -81,8 +84,11 @@ def quantum_of(place):
     off = np.abs(small / step - np.round(small / step))
     if np.mean(off < 0.12) > 0.95:
         return float(step)
-    noise = place - np.convolve(np.pad(place, 2, mode="edge"), np.array([-3, 12, 17, 12, -3]) / 35, "valid")
-    return float(np.sqrt(12 / (1 - 17 / 35)) * 1.4826 * np.median(np.abs(noise)))
+    noise = place[2:-2] - np.convolve(place, np.array([-3, 12, 17, 12, -3]) / 35, "valid")
+    # At rest there is none: where each tick moves, or at least one of five does. By the mean size, as of a normal distribution.
+    stepped = np.lib.stride_tricks.sliding_window_view(np.abs(np.diff(place)) > FINEST_M, 4)
+    moves = stepped.all(axis=1) if np.count_nonzero(stepped.all(axis=1)) > 20 else stepped.any(axis=1)
+    return float(np.sqrt(12 / (1 - 17 / 35)) * np.sqrt(np.pi / 2) * np.mean(np.abs(noise[moves])))
 
 
 def _robust(values):
@@ -102,6 +108,7 @@ class _Fit:
         self.unknown += [base + i for base in (_B, _F, _G, _K) for i in axes] + [_D]
         self.theta = np.zeros(_COUNT)
         self.mode = None
+        self.good, self.slips = motion.good, []
         self.spoilt = np.zeros(count, bool)
         # Noise of the speed below a fiftieth of what moves, at the shortest window that has it.
         place = motion.place_m
@@ -178,7 +185,7 @@ class _Fit:
         left, right = (None, None) if self.mode is None else (self.mode.left, self.mode.right)
         out = []
         for scale in self.scales:
-            lost = scale.touches(~self.m.good, before=True) | scale.touches(self.spoilt, before=True)
+            lost = scale.touches(~self.good, before=True) | scale.touches(self.spoilt, before=True)
             usable = np.stack([~(lost | scale.touches(self.held[:, i])) for i in range(3)], 1)
             out.append((scale.of(self.m.place_m, 2, left), scale.of(self.m.place_m, 1, right), scale.of(self.speed, 0, right),
                         scale.of(self.around, 0, right), scale.of(self.place, 0, right),
@@ -314,6 +321,7 @@ def _fitted(motion, axes, quantum_m, joint_friction):
         fit.follow()
         fit.step(with_instruments=round_ >= 2)
         if round_ == 7:
+            _leave_out_slips(fit)
             _leave_out_spoilt(fit)
         share = _checks(fit, fit.rows(fit.theta[_D]))[0]
         if round_ > 5 and share < best[0]:
@@ -326,6 +334,14 @@ def _fitted(motion, axes, quantum_m, joint_friction):
 
 def estimate(motion, seed=1):
     """Raises NoEstimate."""
+    try:
+        return _estimate(motion, seed)
+    except np.linalg.LinAlgError:
+        raise NoEstimate(f"the motion of these {motion.good.sum() * motion.period_s:.1f} s does not determine mass, friction and delay of all axes "
+                         "that moved; record more of it") from None
+
+
+def _estimate(motion, seed):
     place = motion.place_m
     count = len(place)
     if motion.good.sum() * motion.period_s < 2.0:
@@ -344,6 +360,27 @@ def estimate(motion, seed=1):
         raise NoEstimate(f"mass, friction and delay explain less than {1 - SPOILT:.0%} of the force: friction may take most of it (a higher limit "
                          "helps), something else moves the device, or it is no arm of this model")
     return _with_intervals(fit, quantum_m, seed)
+
+
+def _leave_out_slips(fit):
+    """Steps from one tick to the next that speed does not explain: a count that was lost, a joint that slipped. What the model gets
+    wrong, as a reversal, a mode or a knock, goes on for some ticks: so a slip is SLIP times all of its neighbours, and steps of
+    the encoder as well."""
+    place, way = fit.m.place_m, fit.speed * fit.t
+    off = np.diff(place, axis=0) - (way[:-1] + way[1:]) / 2
+    near = np.abs(off)
+    around = np.zeros_like(near)
+    for by in range(1, NEAR + 1):
+        around[by:] = np.maximum(around[by:], near[:-by])
+        around[:-by] = np.maximum(around[:-by], near[by:])
+    steps = fit.noise * np.sqrt(12)
+    found = (near > SLIP * np.maximum(around, steps)) & (fit.good[:-1] & fit.good[1:])[:, None]
+    found[:, [i for i in range(3) if i not in fit.axes]] = False
+    at = np.flatnonzero(found.any(axis=1))
+    if len(at):
+        fit.good = fit.good.copy()
+        fit.good[np.concatenate([at, at + 1])] = False
+    fit.slips = [(n * fit.t, [AXES[i] for i in np.flatnonzero(found[n])], 1e3 * near[n][found[n]].max()) for n in at]
 
 
 def _leave_out_spoilt(fit):
@@ -400,7 +437,7 @@ def _with_intervals(fit, quantum_m, seed):
                 if abs(correlation[m, n]) > 0.95]
     share, white = _checks(fit, parts)
     return Estimate(values, low, high, quantum_m, fit.mode, fit.joint_friction, [AXES[i] for i in fit.axes], share, white, together,
-                    _spans(fit.spoilt, fit.t), float(fit.m.good.sum() * fit.t))
+                    _spans(fit.spoilt, fit.t), fit.slips, float(fit.good.sum() * fit.t))
 
 
 def _between_widths(fit, parts, u, random, replicates):

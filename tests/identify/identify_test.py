@@ -82,7 +82,7 @@ class TestArms(unittest.TestCase):
             self.assertEqual(found.mode is not None, arm["mode"] > 0)
             if found.mode:
                 self.assertLess(abs(found.mode.hz * 2 * np.pi / arm["mode"] - 1), 0.02)
-            self.assertEqual((found.moved, found.spoilt), (["x", "y", "z"], []))
+            self.assertEqual((found.moved, found.spoilt, found.slips), (["x", "y", "z"], [], []))
 
     def test_an_arm_whose_friction_takes_the_force_is_refused(self):
         with self.assertRaisesRegex(estimate.NoEstimate, "friction may take most of it"):
@@ -96,6 +96,20 @@ class TestArms(unittest.TestCase):
         found = estimate.estimate(motion)
         truth = study.truth_of(self.arms[0])
         self.assertLess(np.abs(found.values[:3] / truth[:3] - 1).max(), 0.03)
+
+    def test_a_slip_is_named_with_its_time_and_costs_nothing(self):
+        motion = motion_of(self.places, self.forces, 0)
+        motion.place_m[30000:, 0] += 4e-4
+        found = estimate.estimate(motion)
+        self.assertEqual([(round(at, 3), axes) for at, axes, _ in found.slips], [(29.999, ["x"])])
+        self.assertLess(abs(found.slips[0][2] - 0.4), 0.05)
+        self.assertLess(np.abs(found.values[:3] / study.truth_of(self.arms[0])[:3] - 1).max(), 0.03)
+        self.assertRegex("\n".join(device_file.remarks(found)), "a slip at 30.00 s: x jumped by 0.39 mm in one tick")
+
+    def test_a_motion_that_ended_in_its_first_seconds_is_refused_in_one_line(self):
+        motion = motion_of(self.places, self.forces, 0)
+        with self.assertRaisesRegex(estimate.NoEstimate, "^the motion of these 3.6 s does not determine .*; record more of it$"):
+            estimate.estimate(estimate.Motion(motion.period_s, motion.place_m[:3600], motion.force_n[:3600], motion.good[:3600]))
 
     def test_an_axis_that_is_held_is_named_and_a_device_that_is_held_has_nothing(self):
         motion = motion_of(self.places, self.forces, 0)
@@ -173,6 +187,27 @@ class TestLog(unittest.TestCase):
         self.assertEqual(list(np.flatnonzero(~motion.good)), [*range(100, 110), *range(200, 230)])
         self.assertRegex(lines[0], "40 of 400 ticks")
 
+    def test_a_force_limit_that_acted_for_longer_than_a_step_is_named_with_its_time(self):
+        ticks = self.rows()
+        ticks["contact_force_n"] = ticks["commanded_force_n"]
+        limits = {"force_n": 3.0, "slew_n_per_ms": 0.5}
+        ticks["contact_force_n"][50:56], ticks["flags"][50:56] = 2.0, log_motion.CLAMPED  # the slew limit, for the six ticks that it may
+        self.assertEqual(log_motion.motion_of(ticks, 0.001, 1.0, np.zeros(3), limits)[1], [])
+        ticks["contact_force_n"][120:170], ticks["flags"][120:170] = 2.0, log_motion.CLAMPED
+        ticks["contact_force_n"][150] = 4.0
+        self.assertEqual(log_motion.motion_of(ticks, 0.001, 1.0, np.zeros(3), limits)[1],
+                         ["a force limit acted for 0.05 s in all, the first time 0.12 s on: 6.93 N asked, 0.866 N given, which counts"])
+
+    def test_a_fault_that_ended_it_is_named_with_its_time(self):
+        ticks = self.rows()
+        ticks["phase"][300:], ticks["fault"][300:] = 5, 1
+        motion, lines = log_motion.motion_of(ticks, 0.001, 1.0, np.zeros(3))
+        self.assertEqual(len(motion.place_m), 300)
+        self.assertEqual(lines, ["the motors went off by a fault 0.30 s on: stale_input; what came before counts"])
+        page = (pathlib.Path(ROOT) / "docs/log.md").read_text().split("## Faults")[1]
+        self.assertEqual([row.split("|")[2].strip() for row in page.splitlines() if row.startswith("|")][2:2 + len(log_motion.FAULTS)],
+                         list(log_motion.FAULTS))
+
     def test_a_log_without_a_force_is_refused_in_one_line(self):
         ticks = self.rows()
         ticks["phase"] = 1
@@ -181,9 +216,9 @@ class TestLog(unittest.TestCase):
 
     def test_the_command_says_in_one_line_what_is_wrong(self):
         with tempfile.TemporaryDirectory() as folder:
-            for words, code, line in (([], 2, "no --log"), (["--log", folder], 2, "ticks.npy"), (["--log", folder, "--out", "a"], 2, "is no .toml"),
+            for words, code, line in (([], 2, "no --scene and no --log"), (["--log", folder], 2, "ticks.npy"), (["--log", folder, "--out", "a"], 2, "is no .toml"),
                                       (["--lag", "a"], 2, "unrecognized arguments: --lag a")):
-                done = subprocess.run([sys.executable, "-B", f"{ROOT}/identify", ROOT, *words], capture_output=True, text=True, check=False)
+                done = subprocess.run([sys.executable, "-B", f"{ROOT}/identify", ROOT, f"{ROOT}/nowhere", *words], capture_output=True, text=True, check=False)
                 self.assertEqual((done.returncode, done.stderr.count("\n"), done.stdout), (code, 1, ""), done.stderr)
                 self.assertIn(line, done.stderr)
 
