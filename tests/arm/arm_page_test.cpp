@@ -27,12 +27,8 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using kerf::ArmPageAdapter;
-using kerf::ArmPageController;
-using kerf::ArmState;
-using kerf::CartesianCommand;
-using kerf::CartesianReport;
-using kerf::Personality;
+namespace kerf::arm_page_test {
+
 using kerf::test::error_of;
 using kerf::test::RuntimeFolder;
 using Absence = ArmPageController::Absence;
@@ -494,3 +490,5 @@ TEST_CASE("page: in lock-step a controller begins with the newest report, and it
   CHECK(kerf::decode_cartesian_report(packet)->number == 3);
   CHECK(port.receive(packet) == 0);
 }
+
+}  // namespace kerf::arm_page_test

@@ -18,6 +18,8 @@
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::arm_pairs_test {
+
 using kerf::test::eventually;
 using kerf::test::Process;
 using kerf::test::text_of;
@@ -164,3 +166,5 @@ TEST_CASE("arm: a device that fails while its library hangs is told first, by on
     arms.end_with_one_line(pairs);
   }
 }
+
+}  // namespace kerf::arm_pairs_test

@@ -14,9 +14,8 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using kerf::ArmPageAdapter;
-using kerf::ArmState;
-using kerf::Personality;
+namespace kerf::arm_port_test {
+
 using kerf::test::error_of;
 using kerf::test::RuntimeFolder;
 
@@ -95,3 +94,5 @@ TEST_CASE("arm port: a driver above it reads poses and gives forces; the end of 
   CHECK_FALSE(arm.newest()->command.force_on);
   CHECK_FALSE(port->wait(1000));  // at once
 }
+
+}  // namespace kerf::arm_port_test

@@ -29,8 +29,8 @@
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using kerf::ArmPort;
-using kerf::Personality;
+namespace kerf::arm_program_test {
+
 using kerf::test::eventually;
 using kerf::test::Process;
 using kerf::test::RuntimeFolder;
@@ -512,3 +512,5 @@ TEST_CASE("arm: --port arm starts one if none runs; it ends with its controller,
   CHECK(eventually([] { return kerf::running_arms().empty(); }, 20s));
   CHECK(bench.last_call().find("hdDisableDevice") != std::string::npos);
 }
+
+}  // namespace kerf::arm_program_test

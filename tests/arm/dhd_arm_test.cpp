@@ -13,8 +13,8 @@
 #include "tests/arm/mock_library.hpp"
 #include "tests/support/errors.hpp"
 
-using kerf::DhdArm;
-using kerf::Personality;
+namespace kerf::dhd_arm_test {
+
 using kerf::test::kUpright;
 using kerf::test::Link;
 using kerf::test::MockLibrary;
@@ -316,3 +316,5 @@ TEST_CASE("dhd: what cannot be opened is one line") {
           DhdArm({.library = lacking.path()}, link.exchange);
         }).find(": lacks dhdEnableForce, dhdSetForce; install ") != std::string::npos);
 }
+
+}  // namespace kerf::dhd_arm_test

@@ -10,9 +10,8 @@
 
 #include "tests/arm/mock_library.hpp"
 
-using kerf::ArmExchange;
-using kerf::ArmReading;
-using kerf::Personality;
+namespace kerf::exchange_test {
+
 using kerf::test::Link;
 using kerf::test::test_ns;
 using Force = std::array<double, 3>;
@@ -230,3 +229,5 @@ TEST_CASE("orientation: each quarter turn, and no mirror") {
   CHECK_FALSE(kerf::orientation_of({1.03, 0, 0}, y, z));
   CHECK(kerf::orientation_of({1.02, 0, 0}, y, z));
 }
+
+}  // namespace kerf::exchange_test

@@ -18,6 +18,7 @@
 #include "shared/posix/stop_signals.hpp"
 #include "tests/arm/mock_library.hpp"
 
+namespace kerf::guard_test {
 namespace {
 
 using kerf::test::Link;
@@ -144,3 +145,5 @@ TEST_CASE("overseer: the signals of the user are taken, whatever was done with t
           }) == 0);
   }
 }
+
+}  // namespace kerf::guard_test

@@ -13,8 +13,8 @@
 #include "tests/arm/mock_library.hpp"
 #include "tests/support/errors.hpp"
 
-using kerf::HdArm;
-using kerf::Personality;
+namespace kerf::hd_arm_test {
+
 using kerf::test::kUpright;
 using kerf::test::Link;
 using kerf::test::MockLibrary;
@@ -294,3 +294,5 @@ TEST_CASE("hd: a library that gives no names does no harm") {
   Bench bench("null_strings");
   CHECK(bench.arm.facts().size() == 6);
 }
+
+}  // namespace kerf::hd_arm_test

@@ -5,6 +5,8 @@
 
 #include <doctest/doctest.h>
 
+namespace kerf::address_test {
+
 using namespace kerf::bridge;
 
 TEST_CASE("an address is taken as serve prints it and as a browser shows it") {
@@ -97,3 +99,5 @@ TEST_CASE("the address of a proxy is one that a browser opens, without a token")
     }
   }
 }
+
+}  // namespace kerf::address_test

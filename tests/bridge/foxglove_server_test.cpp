@@ -14,7 +14,8 @@
 
 #include "tests/bridge/server_bench.hpp"
 
-using namespace kerf;
+namespace kerf::foxglove_server_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -186,3 +187,5 @@ TEST_CASE("a Foxglove client that sends too much or too often is closed") {
 }
 
 TEST_SUITE_END();
+
+}  // namespace kerf::foxglove_server_test

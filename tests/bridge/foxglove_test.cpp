@@ -14,7 +14,8 @@
 #include "tests/json.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::foxglove_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -381,3 +382,5 @@ TEST_CASE("a client may come before the controller, and stays when another run f
   }
   CHECK(client.texts.size() == 3 + 2 * 2);
 }
+
+}  // namespace kerf::foxglove_test

@@ -25,7 +25,8 @@
 #include "tests/bridge/local_port.hpp"
 #include "tests/bridge/server_bench.hpp"
 
-using namespace kerf;
+namespace kerf::join_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -218,3 +219,5 @@ TEST_CASE("between two runs a link that is silent for 2 s is given up too") {
 }
 
 TEST_SUITE_END();
+
+}  // namespace kerf::join_test

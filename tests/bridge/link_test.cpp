@@ -7,6 +7,8 @@
 
 #include "tests/studies/bridge/two_machines.hpp"
 
+namespace kerf::link_test {
+
 using kerf::two_machines::Link;
 using kerf::two_machines::LinkSettings;
 
@@ -68,3 +70,5 @@ TEST_CASE("losses are as many as asked for, and the same for the same seed") {
   CHECK(first != losses(4, 0));
   CHECK(first != losses(3, 1));
 }
+
+}  // namespace kerf::link_test

@@ -22,7 +22,8 @@
 #include "tests/segment/segment_support.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::loop_test {
+
 using namespace kerf::bridge;
 using kerf::test::NoiseVolume;
 using kerf::test::RuntimeFolder;
@@ -207,3 +208,5 @@ TEST_CASE("the end of a run arrives with its last volume") {
   CHECK(far_picture(far.reader()).hash == near.hashes[near.tick]);
   CHECK(far.reader().latest()->tick == near.tick);
 }
+
+}  // namespace kerf::loop_test

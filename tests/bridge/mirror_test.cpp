@@ -14,7 +14,8 @@
 #include "tests/bridge/sender.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::mirror_test {
+
 using namespace kerf::bridge;
 using kerf::bridge::test::Message;
 using kerf::bridge::test::Sender;
@@ -358,3 +359,5 @@ TEST_CASE("a local reader's command gets the far side's answer, or is told that 
   done = true;
   far.join();
 }
+
+}  // namespace kerf::mirror_test

@@ -11,6 +11,8 @@
 #include "bridge/serve/serve.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::qr_code_test {
+
 using kerf::bridge::qr_code;
 using kerf::test::TemporaryFolder;
 
@@ -104,3 +106,5 @@ TEST_CASE("a decoder reads the address back") {
 TEST_CASE("what no code holds is one line") {
   CHECK(qr_code(std::string(4000, 'x')) == "no QR code: the address is too long for one\n");
 }
+
+}  // namespace kerf::qr_code_test

@@ -9,7 +9,8 @@
 #include "bridge/net/tokens.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::security_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -100,3 +101,5 @@ TEST_CASE("targets, cookies and hosts come apart as browsers put them together")
 }
 
 TEST_SUITE_END();
+
+}  // namespace kerf::security_test

@@ -16,7 +16,8 @@
 #include "bridge/wire/messages.hpp"
 #include "tests/bridge/server_bench.hpp"
 
-using namespace kerf;
+namespace kerf::server_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -529,3 +530,5 @@ TEST_CASE("a port that is taken and an address of nobody are told in one line") 
 }
 
 TEST_SUITE_END();
+
+}  // namespace kerf::server_test

@@ -19,7 +19,8 @@
 #include "tests/bridge/far_side.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::stream_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -359,3 +360,5 @@ TEST_CASE("packing pays on links slower than speed (1 - 1 / ratio)") {
   for (int i = 0; i < 320; ++i) tried += choice.pays(1e9) ? 1 : 0;
   CHECK(tried == 10);
 }
+
+}  // namespace kerf::stream_test

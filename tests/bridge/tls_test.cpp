@@ -20,7 +20,8 @@
 #include "tests/bridge/join_words.hpp"
 #include "tests/bridge/server_bench.hpp"
 
-using namespace kerf;
+namespace kerf::tls_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -238,3 +239,5 @@ TEST_CASE("a fingerprint is 64 hex digits, with colons or without, and excludes 
 }
 
 TEST_SUITE_END();
+
+}  // namespace kerf::tls_test

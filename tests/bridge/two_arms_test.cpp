@@ -17,7 +17,8 @@
 #include "tests/segment/segment_support.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::two_arms_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -183,3 +184,5 @@ TEST_CASE("records of another number of arms than the greeting's are refused") {
   pair.resize(sizeof head + 2 * sizeof(TickRecord));
   CHECK_THROWS_AS(mirror.records(pair), StreamOutOfSync);
 }
+
+}  // namespace kerf::two_arms_test

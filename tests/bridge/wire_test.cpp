@@ -17,7 +17,8 @@
 #include "bridge/wire/parse.hpp"
 #include "tests/bridge/sender.hpp"
 
-using namespace kerf;
+namespace kerf::wire_test {
+
 using namespace kerf::bridge;
 
 namespace {
@@ -276,3 +277,5 @@ TEST_CASE("the set hash does not depend on the order in which versions came") {
   CHECK(ab == ba);
   CHECK(ab != with_block(with_block(0, 1, 0, 2, 78), 2, 0, 4, 78));
 }
+
+}  // namespace kerf::wire_test

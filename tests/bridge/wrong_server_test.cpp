@@ -15,6 +15,8 @@
 #include "tests/bridge/local_port.hpp"
 #include "tests/bridge/websocket_bytes.hpp"
 
+namespace kerf::wrong_server_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 
@@ -135,3 +137,5 @@ TEST_CASE("join outlives whatever frames a server sends before, in and after its
 }
 
 TEST_SUITE_END();
+
+}  // namespace kerf::wrong_server_test

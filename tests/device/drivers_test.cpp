@@ -13,13 +13,7 @@
 #include "shared/wire/woodenhaptics.hpp"
 #include "tests/device/fake_port.hpp"
 
-using kerf::FalconCommand;
-using kerf::FalconReport;
-using kerf::OmniCommand;
-using kerf::WoodenCommand;
-using kerf::WoodenReport;
-namespace wooden = kerf::wooden;
-
+namespace kerf::drivers_test {
 namespace {
 
 using Counts = std::array<std::int16_t, 3>;
@@ -479,3 +473,5 @@ TEST_CASE("falcon: buttons that are pressed are no life of a position") {
   }
   CHECK(fresh == 3001);  // the first one moves
 }
+
+}  // namespace kerf::drivers_test

@@ -14,6 +14,8 @@
 #include "shared/wire/falcon.hpp"
 #include "tests/support/errors.hpp"
 
+namespace kerf::falcon_boot_test {
+
 using kerf::falcon::FtdiRequest;
 using kerf::test::error_of;
 using kerf::test::has;
@@ -143,3 +145,5 @@ TEST_CASE("falcon boot: an error is one line with its position") {
   CHECK(has(read_error("/nowhere/at/all"), "firmware /nowhere/at/all: No such file"));
   CHECK(has(read_error("/dev/null"), "is no regular file; name the file"));
 }
+
+}  // namespace kerf::falcon_boot_test

@@ -14,10 +14,8 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using kerf::cycle_of_stamp;
-using kerf::cycles_between;
-using kerf::FirewireOptions;
-using kerf::parse_firewire_port;
+namespace kerf::firewire_test {
+
 using kerf::test::error_of;
 using kerf::test::has;
 
@@ -144,3 +142,5 @@ TEST_CASE("a filled queue is at its depth again soon after the servo was late or
   for (int i = 0; i < 20; ++i) delay = engine.tick(now += kPeriod);
   CHECK(delay <= 5);
 }
+
+}  // namespace kerf::firewire_test

@@ -12,8 +12,7 @@
 
 #include <doctest/doctest.h>
 
-using kerf::Turns;
-
+namespace kerf::io_mailbox_test {
 namespace {
 
 using Bytes = std::array<std::uint8_t, kerf::MailboxPacket::kMaxBytes>;
@@ -136,3 +135,5 @@ TEST_CASE("turns: a command out of turn is waited for as well") {
   turns.sent(3);
   CHECK_FALSE(turns.ours(4));
 }
+
+}  // namespace kerf::io_mailbox_test

@@ -26,11 +26,9 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::ports_test {
 namespace {
 
-using kerf::LinkHello;
-using kerf::Personality;
-using kerf::Turn;
 using kerf::test::error_of;
 using kerf::test::FakePort;
 using kerf::test::has;
@@ -453,3 +451,5 @@ TEST_CASE("a partner that does not fit, has ended or does not answer is refused"
   const std::atomic<bool> stop{true};
   CHECK(has(refusal_of(mute, 60000, stop), "nobody answers"));
 }
+
+}  // namespace kerf::ports_test

@@ -13,8 +13,7 @@
 #include "shared/wire/woodenhaptics.hpp"
 #include "tests/device/fake_port.hpp"
 
-using namespace kerf;
-
+namespace kerf::two_cycles_test {
 namespace {
 
 ServoOutput pushing(bool on) {
@@ -198,3 +197,5 @@ TEST_CASE("a device that lets go sends out of turn each time it lets go, and no 
     CHECK(port.sent_now == cycle);
   }
 }
+
+}  // namespace kerf::two_cycles_test

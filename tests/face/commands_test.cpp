@@ -16,6 +16,7 @@
 
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::commands_test {
 namespace {
 
 const std::string kScenes = KERF_SCENES;
@@ -86,3 +87,5 @@ TEST_CASE("commands of two arms are in the log, and a replay applies them as the
   CHECK(outcome.ticks == 2600);
   CHECK_FALSE(outcome.difference.has_value());
 }
+
+}  // namespace kerf::commands_test

@@ -22,6 +22,7 @@
 #include "shared/external/external_page.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::device_test {
 namespace {
 
 /// A runtime folder for these pages alone.
@@ -259,3 +260,5 @@ TEST_CASE("neither side sees half of what the other one writes") {
   stop = true;
   page.publish(0, record_of(1U << 24));
 }
+
+}  // namespace kerf::device_test

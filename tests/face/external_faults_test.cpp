@@ -14,6 +14,7 @@
 #include <kerf/servo.hpp>
 #include <kerf/tick.hpp>
 
+namespace kerf::external_faults_test {
 namespace {
 
 constexpr int kSeeds = 20, kTicks = 1200;
@@ -119,3 +120,5 @@ TEST_CASE("no program breaks a limit of any device, also if the device has fault
     CHECK(rendered_n > 1);
   }
 }
+
+}  // namespace kerf::external_faults_test

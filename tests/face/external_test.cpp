@@ -17,6 +17,7 @@
 
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::external_test {
 namespace {
 
 const std::string kScenes = KERF_SCENES;
@@ -318,3 +319,5 @@ TEST_CASE("a run with a program's force is replayed from its log alone") {
     CHECK(read.replay({"limits.force_n=1"}).difference.has_value());
   }
 }
+
+}  // namespace kerf::external_test

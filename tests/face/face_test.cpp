@@ -27,6 +27,7 @@
 #include "shared/segment/writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::face_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -607,3 +608,5 @@ TEST_CASE("a run on a wall shows each tick, and a map each seed") {
           static_cast<void>(kerf::column_loop({{"damping", "0,1"}}));
         }) == "axes: 2 columns; give each axis one value");
 }
+
+}  // namespace kerf::face_test

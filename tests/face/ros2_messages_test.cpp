@@ -4,6 +4,7 @@
 
 #include "examples/ros2/messages.hpp"
 
+namespace kerf::ros2_messages_test {
 namespace {
 
 struct Vector3 {
@@ -64,3 +65,5 @@ TEST_CASE("the node for ROS 2 has metres, the derivative of its pose, and the fo
   CHECK(force.stiffness_n_per_mm == 0);
   CHECK(force.damping_ns_per_mm == 0);
 }
+
+}  // namespace kerf::ros2_messages_test

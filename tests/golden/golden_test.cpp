@@ -15,7 +15,8 @@
 #include "tests/golden/golden_run.hpp"
 #include "tests/support/sets_to_run.hpp"
 
-using namespace kerf;
+namespace kerf::golden_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -107,3 +108,5 @@ TEST_CASE("3 s of cutting by the proxy's force end in the known bits on every in
     CHECK(run.motor_ticks > 2'000);
   }
 }
+
+}  // namespace kerf::golden_test

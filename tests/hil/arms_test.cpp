@@ -14,14 +14,9 @@
 #include "hil/device/wooden.hpp"
 #include "tests/hil/model_runs.hpp"
 
+namespace kerf::arms_test {
 namespace {
 
-using kerf::ArmPose;
-using kerf::DeviceVec;
-using kerf::FalconArm;
-using kerf::JointVec;
-using kerf::OmniArm;
-using kerf::WoodenArm;
 using kerf::falcon::kRadPerCount;
 using kerf::falcon::kRadPerDegree;
 using kerf::omni::kPi;
@@ -274,3 +269,5 @@ TEST_CASE("wooden: an end stop keeps the arm in its range") {
   CHECK(q.y == doctest::Approx(1.35));
   CHECK(norm(velocity) < before);
 }
+
+}  // namespace kerf::arms_test

@@ -19,12 +19,8 @@
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/woodenhaptics.hpp"
 
+namespace kerf::emulator_test {
 namespace {
-
-using kerf::DeviceVec;
-using kerf::Emulator;
-using kerf::OmniCommand;
-using kerf::OmniParams;
 
 constexpr int kTickCycles = 8;  // 1 kHz
 constexpr int kTicksPerSecond = 1000;
@@ -185,3 +181,5 @@ TEST_CASE("a packet of another device is refused and changes nothing") {
   other.advance(kTickCycles);
   CHECK(other.next_packet().empty());
 }
+
+}  // namespace kerf::emulator_test

@@ -29,11 +29,8 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::hand_test {
 namespace {
-
-using kerf::DeviceVec;
-using kerf::HandGoal;
-using kerf::HandMotion;
 
 using kerf::test::kSecond;
 const DeviceVec<double> kDock{0, -70, -86};
@@ -219,9 +216,6 @@ TEST_CASE("the tip of a soft and heavy hand swings past its start by no more tha
 
 namespace {
 
-using kerf::GuidedHand;
-using kerf::HandTarget;
-
 constexpr double kStiffness = 0.5;  // N/mm
 
 const HandGoal kStart = kerf::test::at({0, 5, 0});
@@ -388,8 +382,6 @@ TEST_CASE(
 
 namespace {
 
-using kerf::HandGreeting;
-
 constexpr int kAccept = kSecond / 20;  // cycles until a window is accepted
 
 /// A hand at its start.
@@ -497,3 +489,5 @@ TEST_CASE("a hand socket in no folder is refused by the name of its option") {
           kerf::HandServer("/nowhere/at/all");
         }).starts_with("--hand-socket: /nowhere/at/all"));
 }
+
+}  // namespace kerf::hand_test

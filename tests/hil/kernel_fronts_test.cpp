@@ -31,6 +31,7 @@
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/woodenhaptics.hpp"
 
+namespace kerf::kernel_fronts_test {
 namespace {
 
 /// Lets the device serve for so long, and then until nothing is due of that time: if the
@@ -397,3 +398,5 @@ TEST_CASE("usbip: a host that breaks the protocol is disconnected") {
   unknown.hear(5);
   CHECK(unknown.device().left());
 }
+
+}  // namespace kerf::kernel_fronts_test

@@ -17,15 +17,9 @@
 #include "hil/script/hand_script_file.hpp"
 #include "tests/hil/model_runs.hpp"
 
+namespace kerf::models_test {
 namespace {
 
-using kerf::DeviceVec;
-using kerf::FalconModel;
-using kerf::FalconParams;
-using kerf::JointVec;
-using kerf::OmniModel;
-using kerf::OmniParams;
-using kerf::WoodenModel;
 using kerf::test::at;
 using kerf::test::kSecond;
 using kerf::test::push;
@@ -180,3 +174,5 @@ TEST_CASE("every script of the project stays in the reach of each arm and moves 
   check_scripts<FalconModel>();
   check_scripts<WoodenModel>();
 }
+
+}  // namespace kerf::models_test

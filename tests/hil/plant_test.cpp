@@ -18,12 +18,9 @@
 #include "hil/device/omni.hpp"
 #include "tests/hil/model_runs.hpp"
 
+namespace kerf::plant_test {
 namespace {
 
-using kerf::DeviceVec;
-using kerf::OmniModel;
-using kerf::OmniParams;
-using kerf::TipMass;
 using kerf::test::at;
 using kerf::test::kSecond;
 using kerf::test::push;
@@ -318,3 +315,5 @@ TEST_CASE("behind a stiff mode the arm moves as with rigid rotors") {
   CHECK(norm(moved) > 3);
   CHECK(norm(stiff.tip_mm() - rigid.tip_mm()) < 0.03 * norm(moved));
 }
+
+}  // namespace kerf::plant_test

@@ -15,9 +15,9 @@
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::program_test {
 namespace {
 
-using kerf::OmniCommand;
 using kerf::test::EmulatorRun;
 using kerf::test::eventually;
 using kerf::test::FakeHost;
@@ -195,3 +195,5 @@ TEST_CASE("a report that would replace a script, or cannot be written, is exit c
   CHECK(run.code == 2);
   CHECK(has(run.err, "kerf-emulator: /nowhere/report.json"));
 }
+
+}  // namespace kerf::program_test

@@ -13,10 +13,9 @@
 #include "hil/device/cartesian.hpp"
 #include "tests/hil/bytes_of_models.hpp"
 
+namespace kerf::published_cartesian_test {
 namespace {
 
-using kerf::DeviceVec;
-using kerf::HandGoal;
 using namespace kerf::test;  // NOLINT(google-build-using-namespace)
 
 struct Figures {
@@ -143,3 +142,5 @@ TEST_CASE(
     }
   }
 }
+
+}  // namespace kerf::published_cartesian_test

@@ -17,11 +17,9 @@
 #include "hil/device/wooden.hpp"
 #include "tests/hil/bytes_of_models.hpp"
 
+namespace kerf::published_test {
 namespace {
 
-using kerf::DeviceModel;
-using kerf::DeviceVec;
-using kerf::HandGoal;
 using namespace kerf::test;  // NOLINT(google-build-using-namespace)
 
 const DeviceVec<double> kPlaces[] = {{0, 0, 0}, {35, 20, -15}, {-40, -25, 10}, {10, 45, 25}};
@@ -307,3 +305,5 @@ TEST_CASE(
     CHECK(norm(model.motor_force_n()) == 0);
   }
 }
+
+}  // namespace kerf::published_test

@@ -14,20 +14,9 @@
 #include "hil/device/wooden.hpp"
 #include "tests/hil/model_runs.hpp"
 
+namespace kerf::reports_test {
 namespace {
 
-using kerf::DeviceVec;
-using kerf::FalconCommand;
-using kerf::FalconModel;
-using kerf::FalconParams;
-using kerf::HandGoal;
-using kerf::JointVec;
-using kerf::OmniCommand;
-using kerf::OmniModel;
-using kerf::OmniParams;
-using kerf::WoodenCommand;
-using kerf::WoodenModel;
-using kerf::WoodenParams;
 using kerf::test::at;
 using kerf::test::kSecond;
 using kerf::test::push;
@@ -398,3 +387,5 @@ TEST_CASE("the wireless button adds 10000 to encoder d if there is one") {
     CHECK(model.report().encoder[3] == 0);
   }
 }
+
+}  // namespace kerf::reports_test

@@ -19,12 +19,9 @@
 #include "tests/support/identified_device.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::script_test {
 namespace {
 
-using kerf::DeviceFault;
-using kerf::FaultKind;
-using kerf::HandStep;
-using kerf::parse_fault_script;
 using kerf::test::error_of;
 using kerf::test::has;
 
@@ -366,3 +363,5 @@ TEST_CASE("an identified device is emulated with its mean mass and friction, and
         "emulated device; use 0 to 64");
   CHECK(kerf::test::has(refusal("0.0004, 0.0005", "0.4, 0.5"), "device.viscous_ns_per_mm: "));
 }
+
+}  // namespace kerf::script_test

@@ -32,17 +32,9 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::sockets_test {
 namespace {
 
-using kerf::Emulator;
-using kerf::FrontStats;
-using kerf::HandshakeLink;
-using kerf::LinkHello;
-using kerf::OmniCommand;
-using kerf::OmniReport;
-using kerf::Personality;
-using kerf::SeqpacketServer;
-using kerf::UdpServer;
 using kerf::test::FakeHost;
 using kerf::test::TemporaryFolder;
 using Bytes = std::vector<std::uint8_t>;
@@ -404,3 +396,5 @@ TEST_CASE("in lock-step a session after a hello has the bytes of one without") {
   CHECK(std::vector<Bytes>(answer + 1, heard[1].end()) == heard[0]);
   CHECK(heard[0].size() == 51);
 }
+
+}  // namespace kerf::sockets_test

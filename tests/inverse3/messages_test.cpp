@@ -11,6 +11,7 @@
 
 #include <doctest/doctest.h>
 
+namespace kerf::messages_test {
 namespace {
 
 using namespace kerf::inverse3;
@@ -219,3 +220,5 @@ TEST_CASE("an event has its name, its device and its safety type") {
   CHECK_FALSE(parse_event("[1]", event));
   CHECK_FALSE(parse_event(R"({"name":1})", event));
 }
+
+}  // namespace kerf::messages_test

@@ -22,9 +22,9 @@
 #include "tests/inverse3/served.hpp"
 #include "tests/support/errors.hpp"
 
+namespace kerf::service_arm_test {
 namespace {
 
-using namespace kerf;
 using namespace kerf::test;
 
 }  // namespace
@@ -371,3 +371,5 @@ TEST_CASE("a port by the clock and a service in lock-step do not fit, nor the ot
   ServedService real;
   CHECK(has(error_of([&] { open(real.options(), true); }), "the controller runs in lock-step"));
 }
+
+}  // namespace kerf::service_arm_test

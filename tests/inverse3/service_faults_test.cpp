@@ -19,9 +19,9 @@
 #include "tests/inverse3/served.hpp"
 #include "tests/support/process.hpp"
 
+namespace kerf::service_faults_test {
 namespace {
 
-using namespace kerf;
 using namespace kerf::test;
 
 /// Of the device, from the first client on: after the device is armed.
@@ -470,3 +470,5 @@ TEST_CASE(
 }
 
 TEST_SUITE_END();
+
+}  // namespace kerf::service_faults_test

@@ -15,11 +15,10 @@
 
 #include "tests/support/errors.hpp"
 
+namespace kerf::session_test {
 namespace {
 
 using namespace kerf::inverse3;
-using kerf::CartesianCommand;
-using kerf::CartesianReport;
 using kerf::test::error_of;
 using kerf::test::has;
 
@@ -547,3 +546,5 @@ TEST_CASE("a device that is not listed gives one last report without power, then
   CHECK(run.turn({}, push(500)) == std::array{0.0, 0.0, 0.0});  // back, and barred
   CHECK_FALSE(run.report->homed);
 }
+
+}  // namespace kerf::session_test

@@ -8,9 +8,9 @@
 
 #include <doctest/doctest.h>
 
+namespace kerf::turn_game_test {
 namespace {
 
-using namespace kerf;
 using namespace kerf::inverse3;
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -173,3 +173,5 @@ TEST_CASE(
   bench.arm();
   CHECK(pushes(bench.next()));
 }
+
+}  // namespace kerf::turn_game_test

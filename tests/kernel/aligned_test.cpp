@@ -13,7 +13,8 @@
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/support/sets_to_run.hpp"
 
-using namespace kerf;
+namespace kerf::aligned_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -354,3 +355,5 @@ TEST_CASE("lanes hold 127 chunks of the widest products and not one more, on eve
     }
   }
 }
+
+}  // namespace kerf::aligned_test

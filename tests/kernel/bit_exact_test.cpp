@@ -12,7 +12,8 @@
 #include "tests/kernel/hash.hpp"
 #include "tests/kernel/support.hpp"
 
-using namespace kerf;
+namespace kerf::bit_exact_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -164,3 +165,5 @@ TEST_CASE("a constant expression and the running program give the same bits") {
   CHECK(cut_by_largest_force() == kForceAtCompileTime);
   CHECK(kForceAtCompileTime > 2 * 65534);  // the two voxels of the tool, and more of their rims
 }
+
+}  // namespace kerf::bit_exact_test

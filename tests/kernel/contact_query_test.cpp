@@ -21,7 +21,8 @@
 #include "tests/rig/geometry.hpp"
 #include "tests/rig/tool_meshes.hpp"
 
-using namespace kerf;
+namespace kerf::contact_query_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -481,3 +482,5 @@ TEST_CASE_TEMPLATE("from outside no way is free for a sphere that the map cannot
     if (radius < 60) CHECK(voxels == doctest::Approx(10));
   }
 }
+
+}  // namespace kerf::contact_query_test

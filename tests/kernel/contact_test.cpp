@@ -19,7 +19,8 @@
 #include "tests/support/property.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::contact_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -361,3 +362,5 @@ TEST_CASE(
     CHECK(leak(sobel[i], tool, touching, 6) <= 2.6e-3);
   }
 }
+
+}  // namespace kerf::contact_test

@@ -12,7 +12,8 @@
 #include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
 
-using namespace kerf;
+namespace kerf::contact_volumes_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -304,3 +305,5 @@ TEST_CASE_TEMPLATE("no tick of a sweep spends more than a scene is planned with"
     CHECK(double(most) > 0.8 * double(work.most()));
   }
 }
+
+}  // namespace kerf::contact_volumes_test

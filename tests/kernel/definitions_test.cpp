@@ -18,7 +18,8 @@
 #include "tests/kernel/support.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::definitions_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -195,3 +196,5 @@ TEST_CASE("a modification force of a larger tool is exact in steps of 2^16, beyo
   CHECK(sum.y == -(std::int64_t{64'000} * kMaxExactGradient / 2));
   CHECK(sum.z == 1600 / 2);
 }
+
+}  // namespace kerf::definitions_test

@@ -13,7 +13,8 @@
 #include "tests/support/property.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::gradient_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -181,3 +182,5 @@ TEST_CASE("the steepest volume a kernel can meet stays within 16 bits") {
   CHECK(steepest(GradientKernel::central, true) == 32767);  // 32767.5, kept in range
   CHECK(steepest(GradientKernel::central, false) == -32767);
 }
+
+}  // namespace kerf::gradient_test

@@ -14,7 +14,8 @@
 #include "shared/numeric/hidden_set.hpp"
 #include "tests/support/sets_to_run.hpp"
 
-using namespace kerf;
+namespace kerf::kernel_sets_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -127,3 +128,5 @@ TEST_CASE("every set has the shape by which scenes are planned for it on other p
     CHECK(shape->can_fuse == set->can_fuse);
   }
 }
+
+}  // namespace kerf::kernel_sets_test

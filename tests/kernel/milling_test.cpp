@@ -16,7 +16,8 @@
 #include "tests/support/property.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::milling_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -436,3 +437,5 @@ TEST_CASE("what leaves the volume and what the carry holds are together all that
     CHECK(removed.density_steps * 65536 + kept == owed);
   }
 }
+
+}  // namespace kerf::milling_test

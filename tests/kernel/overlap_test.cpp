@@ -11,7 +11,8 @@
 #include "tests/support/property.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::overlap_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -180,3 +181,5 @@ TEST_CASE("a box too large for its memory, a far tool and an empty one cover not
   CHECK(box.box.empty());
   CHECK(overlap(grid, {}, pose_at({15, 15, 15}), FixedNumbers::kStepOne, box).empty());
 }
+
+}  // namespace kerf::overlap_test

@@ -22,7 +22,8 @@
 #include "tests/kernel/contact_support.hpp"
 #include "tests/support/sets_to_run.hpp"
 
-using namespace kerf;
+namespace kerf::point_sums_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -489,3 +490,5 @@ TEST_CASE("the peak of a closeup moves continuously with its centre") {
     last = height;
   }
 }
+
+}  // namespace kerf::point_sums_test

@@ -15,7 +15,8 @@
 #include "tests/kernel/preston_support.hpp"
 #include "tests/support/sets_to_run.hpp"
 
-using namespace kerf;
+namespace kerf::preston_methods_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -270,3 +271,5 @@ TEST_CASE("a long thin tool of any step along its rows weighs the same in groups
     }
   }
 }
+
+}  // namespace kerf::preston_methods_test

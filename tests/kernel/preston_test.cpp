@@ -15,7 +15,8 @@
 
 #include "tests/kernel/preston_support.hpp"
 
-using namespace kerf;
+namespace kerf::preston_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -445,3 +446,5 @@ TEST_CASE("the same force removes the same at 250 Hz to 8 kHz and 0.05 to 0.25 m
     }
   }
 }
+
+}  // namespace kerf::preston_test

@@ -23,7 +23,8 @@
 #include "tests/kernel/support.hpp"
 #include "tests/support/property.hpp"
 
-using namespace kerf;
+namespace kerf::sampling_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -294,3 +295,5 @@ TEST_CASE_TEMPLATE("a sample beyond the position limit stays at the limit, NaN a
     CHECK(sample_position(pose, ToolOffset{}).z == -kPositionLimitVox);
   }
 }
+
+}  // namespace kerf::sampling_test

@@ -11,7 +11,8 @@
 
 #include "tests/kernel/preston_support.hpp"
 
-using namespace kerf;
+namespace kerf::spindle_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -154,3 +155,5 @@ TEST_CASE_TEMPLATE("friction is bounded and follows within its time constant at 
     CHECK(std::abs(double(felt.x)) <= rest_n);
   }
 }
+
+}  // namespace kerf::spindle_test

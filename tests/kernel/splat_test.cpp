@@ -15,7 +15,8 @@
 #include "tests/kernel/definitions.hpp"
 #include "tests/support/sets_to_run.hpp"
 
-using namespace kerf;
+namespace kerf::splat_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -314,3 +315,5 @@ TEST_CASE("a volume without a single cell is not felt, and a place beyond all vo
     CHECK(count_not_zero(grid, field, tool, samples.table(), pose) == 0);
   }
 }
+
+}  // namespace kerf::splat_test

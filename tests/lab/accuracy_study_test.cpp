@@ -11,6 +11,8 @@
 
 #include "lab/accuracy/study.hpp"
 
+namespace kerf::accuracy_study_test {
+
 using namespace kerf::accuracy;
 
 namespace {
@@ -92,3 +94,5 @@ TEST_CASE("what is timed by plain loops of the lab is marked, and nothing else")
   CHECK(entry("interpolation", "nearest").plain);
   CHECK_FALSE(entry("storage", "aligned 0.0625 mm").plain);
 }
+
+}  // namespace kerf::accuracy_study_test

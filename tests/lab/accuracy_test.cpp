@@ -12,7 +12,8 @@
 #include "lab/accuracy/contact_errors.hpp"
 #include "lab/accuracy/reference_methods.hpp"
 
-using namespace kerf;
+namespace kerf::accuracy_test {
+
 using namespace kerf::accuracy;
 
 namespace {
@@ -194,3 +195,5 @@ TEST_CASE_TEMPLATE("spline weights add up to one, slopes to zero, and reproduce 
     CHECK(slope == doctest::Approx(1));
   }
 }
+
+}  // namespace kerf::accuracy_test

@@ -9,8 +9,7 @@
 #include "lab/rig/virtual_loop.hpp"
 #include "tests/servo/support.hpp"
 
-using kerf::Personality;
-
+namespace kerf::arming_test {
 namespace {
 
 /// From the first bus cycle until the motors go on, in emulated ms; 10 s if they never do.
@@ -50,3 +49,5 @@ TEST_CASE("every device arms at every rate in the same time") {
     CHECK(longest_ms - shortest_ms <= 16);  // four ticks of the slowest: home, see, rest, see
   }
 }
+
+}  // namespace kerf::arming_test

@@ -14,8 +14,8 @@
 #include "shared/wire/omni.hpp"
 #include "tests/servo/support.hpp"
 
-using kerf::OmniCommand;
-using kerf::OmniReport;
+namespace kerf::contract_test {
+
 using kerf::faults::DeviceMoment;
 using kerf::faults::DeviceWire;
 using kerf::faults::FaultOutcome;
@@ -334,3 +334,5 @@ TEST_CASE("after a signal to end the motors go off within 2 ms, and no later pac
   REQUIRE(silent.outcome.violation_count > 0);
   CHECK(silent.outcome.violations[0].find("ms after a signal to end") != std::string::npos);
 }
+
+}  // namespace kerf::contract_test

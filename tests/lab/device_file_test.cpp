@@ -12,11 +12,9 @@
 #include "tests/support/identified_device.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::device_file_test {
 namespace {
 
-using kerf::along;
-using kerf::IdentifiedDevice;
-using kerf::read_identified_device;
 using kerf::test::device_file_with;
 using kerf::test::kDeviceFile;
 using kerf::test::lab;
@@ -136,3 +134,5 @@ TEST_CASE("a file that is no device, and options against it, get one line") {
     CHECK(answer.err.find(line) != std::string::npos);
   }
 }
+
+}  // namespace kerf::device_file_test

@@ -13,9 +13,8 @@
 #include "lab/safety/fault_run.hpp"
 #include "tests/servo/support.hpp"
 
-using kerf::DeviceFault;
-using kerf::FaultKind;
-using kerf::FaultScript;
+namespace kerf::fault_pairs_test {
+
 using kerf::faults::NamedScript;
 using kerf::faults::pair_share_of;
 using kerf::faults::pairs_of;
@@ -164,3 +163,5 @@ TEST_CASE("a signal that asks for the end ends all force, whatever else goes wro
       CHECK_FALSE(outcome.pushed_again);  // else it counts from 0.05 s
   }
 }
+
+}  // namespace kerf::fault_pairs_test

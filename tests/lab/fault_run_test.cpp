@@ -12,10 +12,7 @@
 #include "hil/device/falcon.hpp"
 #include "tests/servo/support.hpp"
 
-using kerf::DeviceFault;
-using kerf::FaultKind;
-using kerf::Personality;
-
+namespace kerf::fault_run_test {
 namespace {
 
 kerf::LoadedScene falcon_scene(int rate_hz = 1000) {
@@ -164,3 +161,5 @@ TEST_CASE("whatever a program with the force does, no rule is broken, and its fo
     }
   }
 }
+
+}  // namespace kerf::fault_run_test

@@ -19,8 +19,7 @@
 #include "controller/law/registry/law_registry.hpp"
 #include "tests/lab/lab_line.hpp"
 
-using namespace kerf;
-
+namespace kerf::law_trial_test {
 namespace {
 
 std::vector<double>* g_kept = nullptr;  // what a law allocates; else the compiler leaves it out
@@ -176,3 +175,5 @@ TEST_CASE("the lab tries one law by its name, and knows all of them") {
   CHECK(lab("roter").find(
             "2 kerf-lab: law roter is unknown; did you mean rooter? known: fine, hoarder") == 0);
 }
+
+}  // namespace kerf::law_trial_test

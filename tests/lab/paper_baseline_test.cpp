@@ -8,7 +8,8 @@
 #include "lab/bench/kernel_bench.hpp"
 #include "tests/kernel/support.hpp"
 
-using namespace kerf;
+namespace kerf::paper_baseline_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -82,3 +83,5 @@ TEST_CASE("a turned tool at the border is felt as in double precision") {
     CHECK(paper.mill(tool, paper_pose(pose), 0.0F).removed == 0);  // its box crosses the border
   }
 }
+
+}  // namespace kerf::paper_baseline_test

@@ -10,6 +10,8 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::program_test {
+
 using kerf::test::cases_in, kerf::test::has, kerf::test::lab, kerf::test::LabAnswer,
     kerf::test::TemporaryFolder;
 
@@ -103,3 +105,5 @@ TEST_CASE("faults calls a run whose hand met nothing an error") {
   CHECK(has(answer.out, "shows nothing: seed 1: the motors never pushed at the tip"));
   CHECK(has(answer.out, "2 runs, 2 show nothing"));
 }
+
+}  // namespace kerf::program_test

@@ -18,6 +18,8 @@
 #include "tests/programs/pair.hpp"
 #include "tests/support/errors.hpp"
 
+namespace kerf::sweep_test {
+
 using kerf::test::eventually;
 using kerf::test::kBin;
 using kerf::test::kScenes;
@@ -382,3 +384,5 @@ TEST_CASE(
   CHECK(report["config_hash"] == fine.at("config_hash"));
   CHECK(std::to_string(report["contact_ticks"].get<int>()) == fine.at("contact_ticks"));
 }
+
+}  // namespace kerf::sweep_test

@@ -29,7 +29,8 @@
 #include "tests/lab/lab_line.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::zwidth_test {
+
 using namespace kerf::zwidth;
 using kerf::test::cases_in, kerf::test::lab, kerf::test::LabAnswer, kerf::test::TemporaryFolder,
     kerf::test::text_of;
@@ -887,3 +888,5 @@ TEST_CASE("what no map has in a part's first line is refused, and nothing crashe
     CHECK_THROWS_AS(static_cast<void>(read_part(path)), HilError);
   }
 }
+
+}  // namespace kerf::zwidth_test

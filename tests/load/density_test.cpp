@@ -18,7 +18,8 @@
 #include "tests/scene/support.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::density_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -317,3 +318,5 @@ TEST_CASE(
             "material.name = \"pulp\" is unknown; known: enamel, nerve"));
   CHECK(has(error(material("nerve") + material("bone")), "\"bone\" is unknown; "));
 }
+
+}  // namespace kerf::density_test

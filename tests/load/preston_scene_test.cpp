@@ -16,7 +16,8 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/scene/support.hpp"
 
-using namespace kerf;
+namespace kerf::preston_scene_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -195,3 +196,5 @@ TEST_CASE_TEMPLATE("the tables cut a block: each material at its rate, at the sa
     CHECK(std::abs(removed_mm3 / (3 * 0.083 * 0.1) - 1) < 1e-3);
   }
 }
+
+}  // namespace kerf::preston_scene_test

@@ -16,7 +16,8 @@
 #include "shared/volume/material.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::removed_volume_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -169,3 +170,5 @@ TEST_CASE("the part that is gone of a voxel has both ends") {
   CHECK(solid_gone(30000, 30001, 30000) == 0);  // it has more than at first
   CHECK(solid_gone(40632, 40631, 1) == 2);
 }
+
+}  // namespace kerf::removed_volume_test

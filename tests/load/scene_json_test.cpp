@@ -14,7 +14,8 @@
 #include "tests/json.hpp"
 #include "tests/scene/support.hpp"
 
-using namespace kerf;
+namespace kerf::scene_json_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -137,3 +138,5 @@ TEST_CASE("a path that is not UTF-8 does not break the JSON") {
   scene.volumes[0].file = "caf\xe9.nrrd";
   CHECK(read_json(canonical_json(scene))["volumes"][0]["file"] == "caf\uFFFD.nrrd");
 }
+
+}  // namespace kerf::scene_json_test

@@ -19,7 +19,8 @@
 #include "tests/support/real_data.hpp"
 #include "tests/tool/stl_support.hpp"
 
-using namespace kerf;
+namespace kerf::scene_load_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -575,3 +576,5 @@ TEST_CASE("a volume without anything solid has no surface, and says so") {
       test::error_of([&] { static_cast<void>(first_surface_from_above(volume)); });
   CHECK(has(error, "no voxel reaches the iso density"));
 }
+
+}  // namespace kerf::scene_load_test

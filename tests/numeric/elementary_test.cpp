@@ -9,8 +9,7 @@
 
 #include <doctest/doctest.h>
 
-using namespace kerf;
-
+namespace kerf::elementary_test {
 namespace {
 
 /// How far `found` is from `exact`, in units of its last place.
@@ -64,3 +63,5 @@ TEST_CASE("ends of the ranges") {
   CHECK(power_of_tenth(-22) == 1e22);
   CHECK(power_of_tenth(2'000'000'000) == 0);
 }
+
+}  // namespace kerf::elementary_test

@@ -12,7 +12,8 @@
 #include "shared/numeric/vec.hpp"
 #include "tests/support/property.hpp"
 
-using namespace kerf;
+namespace kerf::numeric_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -150,3 +151,5 @@ TEST_CASE("a percentile is the smallest value that so large a share does not exc
   }));
   CHECK(percentile({}, 0.5) == 0.0);
 }
+
+}  // namespace kerf::numeric_test

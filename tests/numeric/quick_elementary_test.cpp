@@ -9,8 +9,7 @@
 
 #include <doctest/doctest.h>
 
-using namespace kerf;
-
+namespace kerf::quick_elementary_test {
 namespace {
 
 /// How far `found` is from `exact`, in units of its last place.
@@ -66,3 +65,5 @@ TEST_CASE("quick elementary functions at the ends of their ranges") {
   CHECK(quick::cube_root(0) == 0);
   CHECK(quick::cube_root(27) == doctest::Approx(3));
 }
+
+}  // namespace kerf::quick_elementary_test

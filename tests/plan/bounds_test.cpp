@@ -22,7 +22,8 @@
 #include "tests/plan/costs_support.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::bounds_test {
+
 using namespace kerf::test;
 
 TEST_CASE("a tool covers no more voxels than it is said to, in any pose and any volume") {
@@ -219,3 +220,5 @@ TEST_CASE("a sphere needs the steps of its radius, and more than there are where
   CHECK(free_steps_for(63.6) == 255);
   CHECK(free_steps_for(1000) == 255);
 }
+
+}  // namespace kerf::bounds_test

@@ -21,7 +21,8 @@
 #include "tests/support/identified_device.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::gain_margin_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -375,3 +376,5 @@ TEST_CASE("each of two arms has the identified device that it names") {
   CHECK_FALSE(scene.identified);
   CHECK(second_arm_of(scene).identified);
 }
+
+}  // namespace kerf::gain_margin_test

@@ -19,7 +19,8 @@
 #include "tests/servo/support.hpp"
 #include "tests/support/errors.hpp"
 
-using namespace kerf;
+namespace kerf::scene_check_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -223,3 +224,5 @@ TEST_CASE("an explanation is told in text and JSON with the same figures") {
   CHECK(json["tools"][0]["work_us"] == 10.0);
   CHECK(json["total_bytes"] == (3 << 20) + 64);
 }
+
+}  // namespace kerf::scene_check_test

@@ -22,7 +22,8 @@
 #include "tests/plan/costs_support.hpp"
 #include "tests/support/errors.hpp"
 
-using namespace kerf;
+namespace kerf::scene_costs_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -442,3 +443,5 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   CHECK(unturned.count("ordered samples of cone") == 0);
   CHECK(unturned.count("table of cone") == 1);
 }
+
+}  // namespace kerf::scene_costs_test

@@ -6,6 +6,7 @@
 
 #include "shared/posix/threads.hpp"
 
+namespace kerf::endless_step_test {
 namespace {
 
 /// Whether a step of a thread that does `work` over and over seems endless, in so many looks.
@@ -31,3 +32,5 @@ TEST_CASE("a step that only computes is told from many steps and from a wait") {
   CHECK_FALSE(
       seems_endless([](auto&) { std::this_thread::sleep_for(std::chrono::milliseconds(10)); }, 80));
 }
+
+}  // namespace kerf::endless_step_test

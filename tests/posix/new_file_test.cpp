@@ -18,10 +18,9 @@
 #include "shared/posix/atomic_file.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::new_file_test {
+
 namespace fs = std::filesystem;
-using kerf::AtomicFile;
-using kerf::FileError;
-using kerf::write_new_file;
 using kerf::test::TemporaryFolder;
 using kerf::test::text_of;
 
@@ -324,3 +323,5 @@ TEST_CASE("standard output is written to as it stands, also where it is a file t
   CHECK(status == 0);
   CHECK(text_of(folder / "out") == "before now later");
 }
+
+}  // namespace kerf::new_file_test

@@ -9,6 +9,8 @@
 #include "shared/posix/atomic_file.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::run_files_test {
+
 namespace fs = std::filesystem;
 using kerf::test::TemporaryFolder;
 
@@ -92,3 +94,5 @@ TEST_CASE("a dash is no standard output, and is told so") {
         "-: --csv would make a file of that name; give /dev/stdout for standard output");
   CHECK(refusal({}, {{"--csv", "/dev/stdout", ".csv"}}).empty());
 }
+
+}  // namespace kerf::run_files_test

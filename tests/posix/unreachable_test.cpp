@@ -8,8 +8,9 @@
 #include "shared/posix/error_text.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::unreachable_test {
+
 namespace fs = std::filesystem;
-using kerf::access_error;
 
 TEST_CASE("links in a circle are told as such, where a file is read and where one is written") {
   const kerf::test::TemporaryFolder folder;
@@ -30,3 +31,5 @@ TEST_CASE("links in a circle are told as such, where a file is read and where on
   CHECK_THROWS_WITH_AS(kerf::check_new_file(report), (report.string() + why).c_str(),
                        kerf::FileError);
 }
+
+}  // namespace kerf::unreachable_test

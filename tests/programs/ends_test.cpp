@@ -14,6 +14,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
+namespace kerf::ends_test {
+
 using kerf::test::eventually;
 using kerf::test::Pair;
 using namespace std::chrono_literals;
@@ -155,3 +157,5 @@ TEST_CASE("a controller that stood still with all its threads pushes again only 
     return event["name"] == "watchdog" || event["name"] == "stood_still";
   }));
 }
+
+}  // namespace kerf::ends_test

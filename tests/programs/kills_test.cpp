@@ -21,6 +21,8 @@
 #include "tests/programs/pair.hpp"
 #include "tests/programs/watched_fronts.hpp"
 
+namespace kerf::kills_test {
+
 using kerf::test::eventually;
 using kerf::test::Process;
 using kerf::test::TemporaryFolder;
@@ -178,3 +180,5 @@ TEST_CASE("killed at random moments, the motors are off and nothing is left: on 
 TEST_CASE("killed at random moments, the motors are off and nothing is left: on hid") {
   kill_many(kerf::test::kWatchedFronts[4]);
 }
+
+}  // namespace kerf::kills_test

@@ -13,6 +13,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
+namespace kerf::limits_test {
+
 using kerf::test::eventually;
 using kerf::test::kBin;
 using kerf::test::kScenes;
@@ -340,3 +342,5 @@ TEST_CASE("--probe for a device that is not there ends with 1") {
   });
   CHECK(code == (is_there ? 0 : 1));
 }
+
+}  // namespace kerf::limits_test

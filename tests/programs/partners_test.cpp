@@ -12,6 +12,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
+namespace kerf::partners_test {
+
 using kerf::test::eventually;
 using kerf::test::kBin;
 using kerf::test::kScenes;
@@ -212,3 +214,5 @@ TEST_CASE("nobody who homes the device: after --wait it ends with exit code 1") 
   CHECK(report["ticks"] == 0);
   CHECK(report["end"].get<std::string>().find("never") != std::string::npos);
 }
+
+}  // namespace kerf::partners_test

@@ -17,6 +17,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
+namespace kerf::programs_test {
+
 using kerf::test::eventually;
 using kerf::test::kBin;
 using kerf::test::kScenes;
@@ -323,3 +325,5 @@ TEST_CASE("bad arguments are one line and exit 2") {
                  "--socket", "/nonexistent/socket"})
             .find("nonsense") != std::string::npos);
 }
+
+}  // namespace kerf::programs_test

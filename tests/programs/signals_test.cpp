@@ -14,6 +14,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
+namespace kerf::signals_test {
+
 using kerf::test::eventually;
 using kerf::test::kBin;
 using kerf::test::kScenes;
@@ -276,3 +278,5 @@ TEST_CASE("an emulator without a hand: the controller says within 2 s what it wa
   CHECK(pair.report()["waiting"] ==
         "waiting until homed: pull the grip all the way out, then push it in");
 }
+
+}  // namespace kerf::signals_test

@@ -10,6 +10,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/two_arms.hpp"
 
+namespace kerf::two_arms_virtual_test {
+
 using kerf::test::kScenes;
 using kerf::test::ReadJson;
 using kerf::test::TwoArms;
@@ -125,3 +127,5 @@ TEST_CASE("virtual time: an arm's link and port are its own, and a fault is expl
 
 TEST_SUITE_END();
 #endif
+
+}  // namespace kerf::two_arms_virtual_test

@@ -11,6 +11,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/two_arms.hpp"
 
+namespace kerf::two_arms_waits_test {
+
 using kerf::test::eventually;
 using kerf::test::kScenes;
 using kerf::test::TwoArms;
@@ -68,3 +70,5 @@ TEST_CASE("before there is a device, what is waited for is the port that does no
     CHECK(stopped(run) == waits + "arm:left");
   }
 }
+
+}  // namespace kerf::two_arms_waits_test

@@ -12,6 +12,8 @@
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
+namespace kerf::virtual_time_test {
+
 using kerf::test::kBin;
 using kerf::test::kScenes;
 using kerf::test::Pair;
@@ -162,3 +164,5 @@ TEST_CASE("virtual time: a stiffness that no port takes can be studied, and goes
   CHECK(energy_j(2, "0") > -1e-4);
   CHECK(energy_j(2, "64") < -1e-3);
 }
+
+}  // namespace kerf::virtual_time_test

@@ -11,7 +11,8 @@
 #include "tests/rig/contact_motions.hpp"
 #include "tests/rig/contact_rig.hpp"
 
-using namespace kerf;
+namespace kerf::air_test {
+
 using namespace kerf::extremes;
 using kerf::test::cases;
 
@@ -116,3 +117,5 @@ TEST_CASE_TEMPLATE(
     }
   }
 }
+
+}  // namespace kerf::air_test

@@ -8,7 +8,8 @@
 #include "controller/kernel/proxy/closeup.hpp"
 #include "tests/proxy/support.hpp"
 
-using namespace kerf;
+namespace kerf::cap_test {
+
 using namespace kerf::test;
 
 TEST_CASE_TEMPLATE("a cap lies on its ball, wherever it is laid", N, FixedNumbers, DoubleNumbers) {
@@ -46,3 +47,5 @@ TEST_CASE_TEMPLATE("a cap counts on edges, and not on flats", N, FixedNumbers, D
   CHECK(sharp(0.425) == doctest::Approx(0.5).epsilon(0.01));
   CHECK(sharp(0.34) == 1);
 }
+
+}  // namespace kerf::cap_test

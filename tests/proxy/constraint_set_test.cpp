@@ -5,7 +5,8 @@
 
 #include "tests/rig/geometry.hpp"
 
-using namespace kerf;
+namespace kerf::constraint_set_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -154,3 +155,5 @@ TEST_CASE_TEMPLATE("a place that was too deep teaches the plane that it met", N,
   CHECK(std::abs(double(known.plane[1].depth)) < 1e-4);
   CHECK_FALSE(add_blocking_planes(known, met, place_of<N>({-0.5, 0, 0})));  // known by now
 }
+
+}  // namespace kerf::constraint_set_test

@@ -8,7 +8,8 @@
 #include "controller/kernel/proxy/constraint_set.hpp"
 #include "tests/proxy/support.hpp"
 
-using namespace kerf;
+namespace kerf::curvature_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -147,3 +148,5 @@ TEST_CASE_TEMPLATE("a curvature outlives its tick unless noise may have feigned 
     CHECK(eases(curvature) == kept);
   }
 }
+
+}  // namespace kerf::curvature_test

@@ -9,7 +9,8 @@
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "tests/kernel/contact_support.hpp"
 
-using namespace kerf;
+namespace kerf::debris_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -66,3 +67,5 @@ TEST_CASE_TEMPLATE("a bit of 1.5 units stops a ball; one of 1.2 may slip in, and
   CHECK(small.kept == 0);
   CHECK(small.pulled < 0.5);
 }
+
+}  // namespace kerf::debris_test

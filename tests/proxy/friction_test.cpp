@@ -4,7 +4,8 @@
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "tests/proxy/support.hpp"
 
-using namespace kerf;
+namespace kerf::friction_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -64,3 +65,5 @@ TEST_CASE_TEMPLATE("no friction in the air, and none at 0", N, FixedNumbers, Dou
   Rubbing<N> ice(0);
   CHECK(length(ice.tick({3, -2, 2}) - Point{3, 0, 2}) < 0.02);
 }
+
+}  // namespace kerf::friction_test

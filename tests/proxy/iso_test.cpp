@@ -9,7 +9,8 @@
 #include "tests/case_count.hpp"
 #include "tests/rig/contact_motions.hpp"
 
-using namespace kerf;
+namespace kerf::iso_test {
+
 using namespace kerf::extremes;
 
 TEST_CASE_TEMPLATE("a low or high iso tells the normal as well as one half of full density does", N,
@@ -117,3 +118,5 @@ TEST_CASE_TEMPLATE("matter of 0.97 of the iso holds no tool, wherever and howeve
     }
   }
 }
+
+}  // namespace kerf::iso_test

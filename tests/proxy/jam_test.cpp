@@ -10,7 +10,8 @@
 #include "tests/case_count.hpp"
 #include "tests/rig/contact_rig.hpp"
 
-using namespace kerf;
+namespace kerf::jam_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -107,3 +108,5 @@ TEST_CASE_TEMPLATE("a tool between two sides of a well goes on when its look fin
     CHECK(ticks_out<N>(tool, body, 10, twist, 330) < 330);
   }
 }
+
+}  // namespace kerf::jam_test

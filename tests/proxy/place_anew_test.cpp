@@ -8,7 +8,8 @@
 #include "tests/proxy/support.hpp"
 #include "tests/rig/contact_rig.hpp"
 
-using namespace kerf;
+namespace kerf::place_anew_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -134,3 +135,5 @@ TEST_CASE_TEMPLATE("each of the 26 directions is looked at, however few queries 
     CHECK(length(point_of<N>(pose.centre) - field.way_out) < 0.01);
   }
 }
+
+}  // namespace kerf::place_anew_test

@@ -8,7 +8,8 @@
 #include "tests/kernel/contact_support.hpp"
 #include "tests/proxy/support.hpp"
 
-using namespace kerf;
+namespace kerf::proxy_contact_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -294,3 +295,5 @@ TEST_CASE_TEMPLATE("a wedged tool moves on while the deepest point of its surfac
   // Of coarse samples the tolerance of any position is left.
   CHECK(moves(0.009, 1));
 }
+
+}  // namespace kerf::proxy_contact_test

@@ -11,7 +11,8 @@
 #include "tests/rig/contact_rig.hpp"
 #include "tests/rig/geometry.hpp"
 
-using namespace kerf;
+namespace kerf::shaft_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -311,3 +312,5 @@ TEST_CASE_TEMPLATE("no tick costs more than its bound, whatever there is to feel
   CHECK(most <= rig.field().work().most());
   CHECK(most > rig.field().work().budget() / 2);  // the bound is none that nothing meets
 }
+
+}  // namespace kerf::shaft_test

@@ -9,7 +9,8 @@
 #include "tests/rig/contact_motions.hpp"
 #include "tests/rig/contact_rig.hpp"
 
-using namespace kerf;
+namespace kerf::slide_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -162,3 +163,5 @@ TEST_CASE("a loop of the hand in a crease gives nothing back under a little fric
   CHECK(smooth.largest < 0.01);
   CHECK(rough.largest < 0);
 }
+
+}  // namespace kerf::slide_test

@@ -9,7 +9,8 @@
 #include "controller/kernel/proxy/proxy.hpp"
 #include "tests/proxy/support.hpp"
 
-using namespace kerf;
+namespace kerf::spent_work_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -149,3 +150,5 @@ TEST_CASE_TEMPLATE("a shorter step asks for no free way", N, FixedNumbers, Doubl
   CHECK(cage.asked == 1);
   CHECK(state.pose.centre == ContactVec<Real>{});
 }
+
+}  // namespace kerf::spent_work_test

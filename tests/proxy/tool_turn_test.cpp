@@ -6,7 +6,8 @@
 #include "controller/kernel/proxy/contact_space.hpp"
 #include "tests/rig/geometry.hpp"
 
-using namespace kerf;
+namespace kerf::tool_turn_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -73,3 +74,5 @@ TEST_CASE_TEMPLATE("a turn keeps its length through a million products", N, Fixe
                         double(orientation.w) * double(orientation.w);
   CHECK(std::abs(square - 1) < (sizeof(typename N::Unit) == 4 ? 1e-6 : 1e-12));
 }
+
+}  // namespace kerf::tool_turn_test

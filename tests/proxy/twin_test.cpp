@@ -11,7 +11,8 @@
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "tests/proxy/support.hpp"
 
-using namespace kerf;
+namespace kerf::twin_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -104,3 +105,5 @@ TEST_CASE("fixed point goes where double goes") {
     }
   }
 }
+
+}  // namespace kerf::twin_test

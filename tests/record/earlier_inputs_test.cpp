@@ -11,7 +11,8 @@
 #include "shared/posix/atomic_file.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::earlier_inputs_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -101,3 +102,5 @@ TEST_CASE("inputs that cannot be written are a problem of the recordings, not an
   std::filesystem::create_directory(folder / "kept");
   CHECK(inputs.keep(folder / "kept", kFile).find("run/inputs") != std::string::npos);
 }
+
+}  // namespace kerf::earlier_inputs_test

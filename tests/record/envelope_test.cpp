@@ -7,7 +7,7 @@
 
 #include "record/force_plot.hpp"
 
-using kerf::Envelope;
+namespace kerf::envelope_test {
 
 TEST_CASE("an envelope of few samples is the samples") {
   Envelope envelope(3, 4);
@@ -40,3 +40,5 @@ TEST_CASE("an envelope keeps the extremes, the order and the limit") {
     RC_ASSERT(high == *std::max_element(samples.begin(), samples.end()));
   }));
 }
+
+}  // namespace kerf::envelope_test

@@ -22,7 +22,8 @@
 #include "tests/record/record_support.hpp"
 #include "tests/support/process.hpp"
 
-using namespace kerf;
+namespace kerf::flight_recorder_test {
+
 using namespace kerf::test;
 using namespace std::chrono_literals;
 
@@ -233,3 +234,5 @@ TEST_CASE("a flight recorder does not pass over a recording of another run that 
     CHECK(std::filesystem::exists(kept / kTickLogName) == !is_taken);
   }
 }
+
+}  // namespace kerf::flight_recorder_test

@@ -10,7 +10,8 @@
 #include "shared/segment/ros_messages.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::log_clock_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -165,3 +166,5 @@ TEST_CASE("dates in text, and in the stamps of ROS, also before 1970") {
   CHECK(sec == -1);
   CHECK(nanosec == 750'000'000);
 }
+
+}  // namespace kerf::log_clock_test

@@ -6,7 +6,7 @@
 #include "shared/segment/tick_table.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::log_columns_test {
 
 TEST_CASE("docs/log.md is what the table says") {
   INFO("renew it: ./kerf record columns > docs/log.md");
@@ -36,3 +36,5 @@ TEST_CASE("every flag that a record can have is on the page, once") {
                  kFlagRefused | kFlagShaft | kFlagReset | kFlagUndo | kFlagUndoable | kFlagRedo |
                  kFlagRedoable | kFlagPedal));
 }
+
+}  // namespace kerf::log_columns_test

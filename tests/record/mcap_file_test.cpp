@@ -15,8 +15,7 @@
 #include <doctest/doctest.h>
 #include <zlib.h>
 
-using namespace kerf;
-
+namespace kerf::mcap_file_test {
 namespace {
 
 struct Record {
@@ -179,3 +178,5 @@ TEST_CASE("the index of an MCAP leads to its attachments, whose checksums are ri
   REQUIRE(statistics != all.end());
   CHECK(number_at<std::uint32_t>(statistics->content, 14) == 2);
 }
+
+}  // namespace kerf::mcap_file_test

@@ -11,7 +11,8 @@
 
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::packed_npy_test {
+
 using kerf::test::TemporaryFolder;
 
 namespace {
@@ -47,3 +48,5 @@ TEST_CASE("a packed array that lacks any of its last bytes is not complete") {
     CHECK(!is_complete(path));
   }
 }
+
+}  // namespace kerf::packed_npy_test

@@ -17,7 +17,8 @@
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::recorder_run_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -225,3 +226,5 @@ TEST_CASE("a recorder without a controller waits as long as it was told, then sa
   CHECK(error_of([&] { static_cast<void>(run_recorder(options, stop)); }).find("'a/b'") !=
         std::string::npos);
 }
+
+}  // namespace kerf::recorder_run_test

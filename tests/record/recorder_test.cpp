@@ -3,7 +3,8 @@
 
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::recorder_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -91,3 +92,5 @@ TEST_CASE("of another machine's run a recorder takes what came, and counts what 
   CHECK(recorder.losses().gaps[0].first_index == 2003);
   CHECK(recorder.losses().gaps[0].count == 2);
 }
+
+}  // namespace kerf::recorder_test

@@ -12,7 +12,8 @@
 #include "record/tick_log_writer.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::recording_check_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -164,3 +165,5 @@ TEST_CASE("the seal of a manifest covers each of its bytes") {
   CHECK(seal_of(text + "\n") == Seal::broken);
   CHECK(seal_of("{}") == Seal::none);
 }
+
+}  // namespace kerf::recording_check_test

@@ -10,7 +10,8 @@
 #include "shared/text/json.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::split_log_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -196,3 +197,5 @@ TEST_CASE("a recorder splits by the time of the run, and goes on with --resume")
   CHECK(summary.rows == 4500);
   CHECK(summary.lost_ticks == 0);
 }
+
+}  // namespace kerf::split_log_test

@@ -10,7 +10,8 @@
 #include "shared/volume/checksum.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::tick_log_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -255,3 +256,5 @@ TEST_CASE("a row with a wrong checksum ends a log behind the sound rows before i
   CHECK_NOTHROW(reader.for_each([&](const TickRecord&) { ++visited; }, {.until = 40}));
   CHECK(visited == 40);
 }
+
+}  // namespace kerf::tick_log_test

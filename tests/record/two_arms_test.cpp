@@ -21,7 +21,8 @@
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::two_arms_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -403,3 +404,5 @@ TEST_CASE("a window of ticks finds each fault of either arm, and each again afte
     CHECK(events == "10 " + arm + "overspeed 50 " + arm + "overspeed 55 " + arm + "wrong_dock ");
   }
 }
+
+}  // namespace kerf::two_arms_test

@@ -11,7 +11,8 @@
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 
-using namespace kerf;
+namespace kerf::views_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -318,3 +319,5 @@ TEST_CASE("a place that cannot be written is refused before anything is drawn") 
   CHECK_THROWS_WITH_AS(export_csv(folder / "no recording", folder / "none/a.csv"),
                        doctest::Contains("none/a.csv: cannot be written"), FileError);
 }
+
+}  // namespace kerf::views_test

@@ -13,7 +13,8 @@
 #include "shared/text/text.hpp"
 #include "tests/replay/load_hash.hpp"
 
-using namespace kerf;
+namespace kerf::load_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -55,3 +56,5 @@ TEST_CASE("load: each shipped scene becomes the same bits on every machine") {
   CHECK(compared == found.size());  // each has a line
   CHECK(compared >= 14);
 }
+
+}  // namespace kerf::load_test

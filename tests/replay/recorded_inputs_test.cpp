@@ -18,7 +18,8 @@
 #include "shared/text/text.hpp"
 #include "tests/support/sets_to_run.hpp"
 
-using namespace kerf;
+namespace kerf::recorded_inputs_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -113,3 +114,5 @@ TEST_CASE("recorded inputs end in the recorded bits, on every instruction set") 
     }
   }
 }
+
+}  // namespace kerf::recorded_inputs_test

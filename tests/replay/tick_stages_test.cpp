@@ -13,8 +13,7 @@
 
 #include "shared/segment/layout_table.hpp"
 
-using namespace kerf;
-
+namespace kerf::tick_stages_test {
 namespace {
 
 const std::set<std::string_view> kGiven{"seq",
@@ -75,3 +74,5 @@ TEST_CASE("equal bits are equal: unknown places before docking, but not the othe
   REQUIRE(found);
   CHECK(found->field == "position_mm[0]");
 }
+
+}  // namespace kerf::tick_stages_test

@@ -11,8 +11,7 @@
 #include "replay/replayed_ticks.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-using namespace kerf;
-
+namespace kerf::two_arms_test {
 namespace {
 
 /// A tick in which an arm pushes with a force and removes so many whole voxels.
@@ -86,3 +85,5 @@ TEST_CASE("a difference is told of the arm that has it, of the first one if both
     CHECK(first_difference(recorded, replayed, 2)->arm == 0);
   }
 }
+
+}  // namespace kerf::two_arms_test

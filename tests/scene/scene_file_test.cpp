@@ -19,7 +19,8 @@
 #include "tests/scene/support.hpp"
 #include "tests/support/property.hpp"
 
-using namespace kerf;
+namespace kerf::scene_file_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -527,3 +528,5 @@ TEST_CASE("a damaged scene file is loaded whole or explained") {
     must_work_or_explain([&] { static_cast<void>(load_scene(path)); });
   }));
 }
+
+}  // namespace kerf::scene_file_test

@@ -24,7 +24,8 @@
 #include "tests/scene/scene_lines.hpp"
 #include "tests/scene/support.hpp"
 
-using namespace kerf;
+namespace kerf::scene_keys_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -489,3 +490,5 @@ TEST_CASE("a new row alone brings a key: it is read, checked, told, printed and 
             "limits.grip_n = 1 is of the model proxy; leave it out, or set model = "
             "\"proxy\""));
 }
+
+}  // namespace kerf::scene_keys_test

@@ -14,7 +14,8 @@
 #include "tests/scene/support.hpp"
 #include "tests/support/property.hpp"
 
-using namespace kerf;
+namespace kerf::two_arms_scene_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -192,3 +193,5 @@ TEST_CASE("the JSON of a scene has the second arm, and that of one arm has nothi
   CHECK(two.at("second_tool").get<int>() == 1);
   CHECK_FALSE(has(canonical_json(load(kTools)), "second"));
 }
+
+}  // namespace kerf::two_arms_scene_test

@@ -7,7 +7,7 @@
 
 #include "shared/volume/changed_bricks.hpp"
 
-using namespace kerf;
+namespace kerf::bricks_test {
 
 TEST_CASE("bricks tile every volume: each voxel lies in exactly one") {
   for (const std::int32_t n : {1, 7, 8, 9, 161}) {
@@ -128,3 +128,5 @@ TEST_CASE("changed bricks hold exactly the voxels that differ, in boxes within a
                              [](const auto& a, const auto& b) { return a.id < b.id; }));
   }));
 }
+
+}  // namespace kerf::bricks_test

@@ -14,7 +14,8 @@
 #include "shared/text/text.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::corrupt_segment_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -189,3 +190,5 @@ TEST_CASE("a segment cut short is refused") {
     CHECK_THROWS_AS(static_cast<void>(parse_segment(std::span(bytes).first(size))), SegmentError);
   }
 }
+
+}  // namespace kerf::corrupt_segment_test

@@ -10,7 +10,8 @@
 #include "shared/segment/reader.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::crash_test {
+
 using namespace kerf::test;
 
 TEST_CASE("SIGKILL of the writer at any moment leaves readers bounded and never torn") {
@@ -64,3 +65,5 @@ TEST_CASE("SIGKILL of the writer at any moment leaves readers bounded and never 
   }
   MESSAGE(stopped_in_tick, " of 20 stopped inside a publication");
 }
+
+}  // namespace kerf::crash_test

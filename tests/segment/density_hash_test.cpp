@@ -8,7 +8,7 @@
 
 #include "shared/volume/checksum.hpp"
 
-using namespace kerf;
+namespace kerf::density_hash_test {
 
 TEST_CASE("the hash of a volume is a known number on every machine") {
   std::vector<Density> density(1003);  // whole rounds of four words, one word, a part of a word
@@ -43,3 +43,5 @@ TEST_CASE("the hash of a box depends on what is inside and on nothing outside") 
     }
   }
 }
+
+}  // namespace kerf::density_hash_test

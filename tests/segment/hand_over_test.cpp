@@ -22,7 +22,8 @@
 #include "tests/segment/segment_support.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::hand_over_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -341,3 +342,5 @@ TEST_CASE("connecting where nobody listens says what to start, and names what ru
   CHECK_THROWS_WITH_AS(static_cast<void>(connect_segment("demo")),
                        doctest::Contains("start kerf-controller"), SegmentError);
 }
+
+}  // namespace kerf::hand_over_test

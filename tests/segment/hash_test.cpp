@@ -8,8 +8,7 @@
 
 #include "shared/volume/checksum.hpp"
 
-using namespace kerf;
-
+namespace kerf::hash_test {
 namespace {
 
 std::span<const std::byte> bytes_of(const auto& container) {
@@ -37,3 +36,5 @@ TEST_CASE("crc32c by eight bytes equals crc32c by bits") {
     RC_ASSERT(crc32c(bytes_of(data)) == crc32c_bit_by_bit(bytes_of(data)));
   }));
 }
+
+}  // namespace kerf::hash_test

@@ -7,7 +7,7 @@
 
 #include "shared/segment/layout_table.hpp"
 
-using namespace kerf;
+namespace kerf::layout_test {
 
 TEST_CASE("the ABI hash is that of layout 1.4; a changed field needs a new version") {
   CHECK(kLayoutMajor == 1);
@@ -51,3 +51,5 @@ TEST_CASE("a version tells its tick, and tick 0 is not 'never seen'") {
     CHECK(writing_version(tick + 1) > stable_version(tick));
   }
 }
+
+}  // namespace kerf::layout_test

@@ -9,7 +9,8 @@
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::mirror_test {
+
 using namespace kerf::test;
 
 TEST_CASE("a reader finds in the segment what the writer was given") {
@@ -246,3 +247,5 @@ TEST_CASE("a scene without cutting has no dirty ring and takes no boxes") {
   CHECK(snapshot.tick == 1);
   CHECK(snapshot.density == volume.density);
 }
+
+}  // namespace kerf::mirror_test

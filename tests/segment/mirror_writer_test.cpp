@@ -22,7 +22,8 @@
 #include "tests/segment/segment_support.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::mirror_writer_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -331,3 +332,5 @@ TEST_CASE("a mirror is handed over like a segment, and somebody else answers its
   CHECK(connection.send({.argument = 4}).status == ReplyStatus::busy);
   CHECK(!server.take_command());
 }
+
+}  // namespace kerf::mirror_writer_test

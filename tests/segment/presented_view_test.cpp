@@ -15,7 +15,8 @@
 
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::presented_view_test {
+
 using kerf::test::RuntimeFolder;
 
 namespace {
@@ -130,3 +131,5 @@ TEST_CASE("a view that is none is neither shown nor taken") {
     RC_ASSERT(follower.view() == from(1));
   }));
 }
+
+}  // namespace kerf::presented_view_test

@@ -7,7 +7,8 @@
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::ring_test {
+
 using namespace kerf::test;
 
 TEST_CASE("tick records come back whole, in order, and the newest at once") {
@@ -165,3 +166,5 @@ TEST_CASE("heartbeat and lifecycle follow the writer") {
     CHECK(reader.lifecycle() == life);
   }
 }
+
+}  // namespace kerf::ring_test

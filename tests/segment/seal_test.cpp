@@ -10,7 +10,8 @@
 #include "shared/segment/reader.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::seal_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -90,3 +91,5 @@ TEST_CASE("a spec that cannot be is refused with place and value") {
   spec.arms = 0;
   CHECK(error_of(spec) == "segment: 0 arms; a scene has 1 to 2");
 }
+
+}  // namespace kerf::seal_test

@@ -11,7 +11,8 @@
 #include "shared/segment/seqlock.hpp"
 #include "tests/segment/segment_support.hpp"
 
-using namespace kerf;
+namespace kerf::tearing_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -126,3 +127,5 @@ TEST_CASE("negative control: a reader that ignores the versions does find torn b
   CHECK(torn > 0);
   munmap(at, bytes);
 }
+
+}  // namespace kerf::tearing_test

@@ -15,7 +15,8 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::aligned_scene_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -201,3 +202,5 @@ TEST_CASE("an unturned tool needs the volume's axes to be the world's") {
   scene.cut.model = CutModel::none;
   CHECK(method_of(scene, scene.tools[1], volume) == Method::gather);
 }
+
+}  // namespace kerf::aligned_scene_test

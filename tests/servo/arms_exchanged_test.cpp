@@ -15,7 +15,8 @@
 #include "shared/segment/layout.hpp"
 #include "tests/servo/two_arms_support.hpp"
 
-using namespace kerf;
+namespace kerf::arms_exchanged_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -258,3 +259,5 @@ TEST_CASE("after a stall the force of each arm begins at nothing") {
     }
   }
 }
+
+}  // namespace kerf::arms_exchanged_test

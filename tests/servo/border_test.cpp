@@ -13,7 +13,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::border_test {
+
 using namespace kerf::test;
 using extremes::CuttingHand;
 
@@ -96,3 +97,5 @@ TEST_CASE("on a solid that ends at the volume's border a tool rests, slides and 
     }
   }
 }
+
+}  // namespace kerf::border_test

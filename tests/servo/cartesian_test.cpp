@@ -15,7 +15,8 @@
 #include "tests/rig/kinematic_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::cartesian_test {
+
 using namespace kerf::test;
 using ranges::KinematicHand;
 
@@ -178,3 +179,5 @@ TEST_CASE("a tool turns with the orientation that the device reports") {
   CHECK(out.rotation[6] == doctest::Approx(-1).epsilon(1e-4));
   CHECK(out.rotation[4] == doctest::Approx(1).epsilon(1e-4));
 }
+
+}  // namespace kerf::cartesian_test

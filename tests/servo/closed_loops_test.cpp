@@ -4,6 +4,8 @@
 
 #include "lab/stability/energy_measures.hpp"
 
+namespace kerf::closed_loops_test {
+
 TEST_CASE("F5 through the whole servo: a closed way takes nothing but friction, and leaks") {
   for (const kerf::energy::LoopWork& row : kerf::energy::closed_loops()) {
     CAPTURE(row.model);
@@ -19,3 +21,5 @@ TEST_CASE("F5 through the whole servo: a closed way takes nothing but friction, 
                       << row.friction_mj << " leak " << row.leak_mj);
   }
 }
+
+}  // namespace kerf::closed_loops_test

@@ -10,8 +10,7 @@
 #include "controller/law/virtual_coupling.hpp"
 #include "controller/scene/scene.hpp"
 
-using namespace kerf;
-
+namespace kerf::coupling_test {
 namespace {
 
 template <class N>
@@ -109,3 +108,5 @@ TEST_CASE("fixed follows double, and no input makes it point the wrong way") {
     RC_ASSERT(norm(fixed - truth) <= 2e-3 * (1 + norm(truth)));
   }));
 }
+
+}  // namespace kerf::coupling_test

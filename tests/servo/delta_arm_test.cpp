@@ -12,8 +12,7 @@
 #include "controller/servo/kinematics.hpp"
 #include "shared/wire/falcon.hpp"
 
-using namespace kerf;
-
+namespace kerf::delta_arm_test {
 namespace {
 
 using Point = std::array<double, 3>;
@@ -177,3 +176,5 @@ TEST_CASE("angles that no grip can have give a finite place in fixed point") {
     }
   }
 }
+
+}  // namespace kerf::delta_arm_test

@@ -13,8 +13,7 @@
 
 #include <doctest/doctest.h>
 
-using namespace kerf;
-
+namespace kerf::energy_ledger_test {
 namespace {
 
 template <class N>
@@ -205,3 +204,5 @@ TEST_CASE("energies stay at the ends of their range") {
   CHECK(ledger.lowest_mj() == INT64_MIN);
   CHECK(ledger.total_mj() > 0);
 }
+
+}  // namespace kerf::energy_ledger_test

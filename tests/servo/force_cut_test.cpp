@@ -13,11 +13,13 @@
 #include "controller/loop/allocation_counter.hpp"
 #include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "controller/volume/phantom.hpp"
 #include "tests/case_count.hpp"
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::force_cut_test {
+
 using namespace kerf::test;
 using extremes::RandomNumbers, extremes::CuttingHand, extremes::sink, extremes::SunkForce;
 
@@ -344,3 +346,5 @@ TEST_CASE(
     CHECK(std::abs(tau_s / (area_mm2 / (kMm3PerSN * kStiffness)) - 1) <= 0.01);
   }
 }
+
+}  // namespace kerf::force_cut_test

@@ -7,8 +7,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-using namespace kerf;
-
+namespace kerf::force_limits_test {
 namespace {
 
 template <class N>
@@ -121,3 +120,5 @@ TEST_CASE_TEMPLATE(
   const DeviceVec<Real> across{Real(0.0), Real(2.0), Real(2.0)};
   CHECK(length(sent(across, true)) == doctest::Approx(0.01).epsilon(1e-2));
 }
+
+}  // namespace kerf::force_limits_test

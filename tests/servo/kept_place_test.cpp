@@ -9,7 +9,8 @@
 
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::kept_place_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -109,3 +110,5 @@ TEST_CASE("choosing the tool that is chosen changes no bit, even in contact") {
     CHECK(armed.step(0, y_mm, 0).output_hash == asked.step(0, y_mm, 0).output_hash);
   }
 }
+
+}  // namespace kerf::kept_place_test

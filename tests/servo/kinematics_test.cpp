@@ -13,8 +13,7 @@
 #include "hil/device/omni.hpp"
 #include "shared/wire/omni.hpp"
 
-using namespace kerf;
-
+namespace kerf::kinematics_test {
 namespace {
 
 /// Joint angles inside the Omni's end stops.
@@ -128,3 +127,5 @@ TEST_CASE("gimbal pots read their centre when both wipers are equal, and nothing
     CHECK(double(dead[i]) == 0.0);
   }
 }
+
+}  // namespace kerf::kinematics_test

@@ -17,7 +17,8 @@
 #include "controller/law/registry/law_registry.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::law_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -386,3 +387,5 @@ TEST_CASE("a law that a scene names and the program has not is refused with the 
   CHECK(refusal({LawKind::force, "plain_spring", {{"b", 1}}}) ==
         "test: force.law \"plain_spring\".b = 1 is unknown; known: k");
 }
+
+}  // namespace kerf::law_test

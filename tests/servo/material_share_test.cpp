@@ -16,7 +16,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::material_share_test {
+
 using namespace kerf::test;
 using extremes::CuttingHand;
 
@@ -245,3 +246,5 @@ TEST_CASE("matter that bears a press and may not be cut keeps what is below it")
     CHECK(miller.removed_mm3() == 0);
   }
 }
+
+}  // namespace kerf::material_share_test

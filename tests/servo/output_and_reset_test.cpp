@@ -11,7 +11,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::output_and_reset_test {
+
 using namespace kerf::test;
 using extremes::CuttingHand;
 
@@ -75,3 +76,5 @@ TEST_CASE("a new tool stands still and rubs nothing") {
   CHECK(length(after.modification_n) == 0);
   CHECK(after.spindle_ratio < 0.1);
 }
+
+}  // namespace kerf::output_and_reset_test

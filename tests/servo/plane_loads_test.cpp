@@ -11,7 +11,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::plane_loads_test {
+
 using namespace kerf::test;
 using kerf::extremes::CuttingHand;
 using vec3::cross, vec3::dot;
@@ -92,3 +93,5 @@ TEST_CASE("the friction of cutting turns the tool by its moment about the centre
     CHECK(length(sum_of(moment, -1, out.tip_torque_n_mm)) < 0.1 * length(moment));
   }
 }
+
+}  // namespace kerf::plane_loads_test

@@ -14,7 +14,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::port_energy_test {
+
 using namespace kerf::test;
 using extremes::CuttingHand;
 
@@ -218,3 +219,5 @@ TEST_CASE("a flat of 4 N/mm throws the hand, and either stabiliser holds it; the
     }
   }
 }
+
+}  // namespace kerf::port_energy_test

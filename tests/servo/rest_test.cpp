@@ -8,7 +8,8 @@
 #include "controller/servo/sense.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::rest_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -182,3 +183,5 @@ TEST_CASE("a rest goes on over 5 ms that the host missed, and starts again after
     CHECK(ticks == (missed <= 5 ? 20 - static_cast<int>(missed) : 49));
   }
 }
+
+}  // namespace kerf::rest_test

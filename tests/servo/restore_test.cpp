@@ -21,7 +21,8 @@
 #include "tests/servo/support.hpp"
 #include "tests/support/property.hpp"
 
-using namespace kerf;
+namespace kerf::restore_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -640,3 +641,5 @@ TEST_CASE("every brick has one bit of one block, and comes back from it") {
     }
   }
 }
+
+}  // namespace kerf::restore_test

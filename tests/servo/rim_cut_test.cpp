@@ -11,7 +11,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::rim_cut_test {
+
 using namespace kerf::test;
 using extremes::CuttingHand;
 
@@ -80,3 +81,5 @@ TEST_CASE("what a tool rests on it cuts, wherever its rim lies on the lattice of
     }
   }
 }
+
+}  // namespace kerf::rim_cut_test

@@ -16,7 +16,8 @@
 #include "controller/loop/publisher.hpp"
 #include "tests/servo/two_arms_support.hpp"
 
-using namespace kerf;
+namespace kerf::second_life_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -334,3 +335,5 @@ TEST_CASE("a law that begins anew remembers nothing of what it was fed before") 
   check_laws<FixedNumbers>();
   check_laws<DoubleNumbers>();
 }
+
+}  // namespace kerf::second_life_test

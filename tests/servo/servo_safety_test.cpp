@@ -15,7 +15,8 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::servo_safety_test {
+
 using namespace kerf::test;
 
 TEST_CASE("reports stop: the force holds 5 ms, is zero at 20 ms, motors off, fault latched") {
@@ -335,3 +336,5 @@ TEST_CASE("whatever counters and pots read, the tool keeps its size and the forc
     }
   }
 }
+
+}  // namespace kerf::servo_safety_test

@@ -9,7 +9,8 @@
 #include "controller/loop/allocation_counter.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::servo_step_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -174,3 +175,5 @@ TEST_CASE("the allocation counter sees an allocation") {
   CHECK(CountedAllocations::total() == before + 20);
 }
 #endif
+
+}  // namespace kerf::servo_step_test

@@ -12,7 +12,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::shaft_test {
+
 using namespace kerf::test;
 using extremes::CuttingHand;
 
@@ -248,3 +249,5 @@ TEST_CASE("ticks with a shaft and a handpiece never touch the heap") {
   CHECK(sum_n > 1);
   CHECK(CountedAllocations::total() == before);
 }
+
+}  // namespace kerf::shaft_test

@@ -13,7 +13,8 @@
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::soft_material_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -86,3 +87,5 @@ TEST_CASE("a soft material is cut, and felt after the cut, as a hard one of its 
   CHECK(soft.press_n == doctest::Approx(hard.press_n).epsilon(1e-3));
   CHECK(soft.proxy_offset_mm[1] == doctest::Approx(hard.proxy_offset_mm[1]).epsilon(1e-3));
 }
+
+}  // namespace kerf::soft_material_test

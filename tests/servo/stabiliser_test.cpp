@@ -14,8 +14,7 @@
 #include "lab/rig/port_loop.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
-using namespace kerf;
-
+namespace kerf::stabiliser_test {
 namespace {
 
 template <template <class> class Law, class N>
@@ -203,3 +202,5 @@ TEST_CASE_TEMPLATE("at the ends of every range energy bounding only shortens the
     }
   }
 }
+
+}  // namespace kerf::stabiliser_test

@@ -16,7 +16,8 @@
 #include "tests/proxy/support.hpp"
 #include "tests/servo/two_arms_support.hpp"
 
-using namespace kerf;
+namespace kerf::state_by_behaviour_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -301,3 +302,5 @@ TEST_CASE("a tool that has left the solid is no longer in it, whichever arm") {
     }
   }
 }
+
+}  // namespace kerf::state_by_behaviour_test

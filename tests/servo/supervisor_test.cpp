@@ -6,8 +6,7 @@
 
 #include <doctest/doctest.h>
 
-using namespace kerf;
-
+namespace kerf::supervisor_test {
 namespace {
 
 constexpr SafetyTiming kTiming;
@@ -242,3 +241,5 @@ TEST_CASE("every reachable state and input: only legal transitions, no motors wi
   }
   CHECK(states.size() >= 30);
 }
+
+}  // namespace kerf::supervisor_test

@@ -10,7 +10,8 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
-using namespace kerf;
+namespace kerf::swept_scene_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -103,3 +104,5 @@ TEST_CASE("a scene pays only for the force that it names") {
   scene.cut.model = CutModel::overlap;
   CHECK(has(scene, "table"));
 }
+
+}  // namespace kerf::swept_scene_test

@@ -12,7 +12,8 @@
 #include "controller/loop/allocation_counter.hpp"
 #include "tests/servo/two_arms_support.hpp"
 
-using namespace kerf;
+namespace kerf::two_arms_test {
+
 using namespace kerf::test;
 
 TEST_CASE("each arm feels and cuts as it would alone, to the bit, while the other is elsewhere") {
@@ -199,3 +200,5 @@ TEST_CASE("a scene whose tools fit the budget once and not twice is refused for 
   const std::string error = budget_error(scene, both->costs());
   CHECK(error.find("in both hands") != std::string::npos);
 }
+
+}  // namespace kerf::two_arms_test

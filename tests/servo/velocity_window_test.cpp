@@ -9,8 +9,7 @@
 
 #include "controller/law/velocity_estimators.hpp"
 
-using namespace kerf;
-
+namespace kerf::velocity_window_test {
 namespace {
 
 constexpr double kStepMm = 0.055;  // of the Omni's encoders at the tip
@@ -132,3 +131,5 @@ TEST_CASE_TEMPLATE("missing reports leave a steady hand its velocity", N, FixedN
     }
   }
 }
+
+}  // namespace kerf::velocity_window_test

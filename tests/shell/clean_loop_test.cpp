@@ -39,6 +39,7 @@
 
 #ifndef KERF_SANITIZED  // sanitizers allocate and call for themselves
 
+namespace kerf::clean_loop_test {
 namespace {
 
 using kerf::test::Process;
@@ -281,4 +282,7 @@ TEST_CASE("the guard lets a clean loop pass, and ends one that makes another cal
   CHECK(run_loop(Seed::lock, true).guarded_call == "futex");
   CHECK(run_loop(Seed::wake, true).guarded_call == "");
 }
+
+}  // namespace kerf::clean_loop_test
+
 #endif

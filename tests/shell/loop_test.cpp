@@ -36,7 +36,8 @@
 #include "tests/servo/support.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using kerf::TickGate;
+namespace kerf::loop_test {
+
 using kerf::test::TemporaryFolder;
 
 namespace {
@@ -355,3 +356,5 @@ TEST_CASE("every device is released, though one before it takes nothing") {
   watchdog.look(25 * kMs);
   CHECK(second.sent == before + 1);
 }
+
+}  // namespace kerf::loop_test

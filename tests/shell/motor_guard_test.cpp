@@ -23,6 +23,7 @@
 #include "shared/wire/omni.hpp"
 #include "tests/support/child.hpp"
 
+namespace kerf::motor_guard_test {
 namespace {
 
 using kerf::test::end_in_child;
@@ -235,3 +236,5 @@ TEST_CASE("a signal that is blocked from the start stops too, an ignored one onl
           }) == (signal == SIGINT || signal == SIGTERM ? 1 : 0));
   }
 }
+
+}  // namespace kerf::motor_guard_test

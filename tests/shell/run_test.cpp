@@ -26,8 +26,7 @@
 #include "tests/json.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
-
+namespace kerf::run_test {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -533,3 +532,5 @@ TEST_CASE("a limit of the machine has its own way out, anything else the usual o
   CHECK(remedy_for(ENOENT, "knock") == std::string("knock"));
   CHECK(remedy_for(EAGAIN, "knock") == std::string("knock"));  // a full queue, of a socket
 }
+
+}  // namespace kerf::run_test

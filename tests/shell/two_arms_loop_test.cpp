@@ -28,7 +28,8 @@
 #include "shared/wire/cartesian.hpp"
 #include "tests/servo/two_arms_support.hpp"
 
-using namespace kerf;
+namespace kerf::two_arms_loop_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -479,3 +480,5 @@ TEST_CASE("in lock-step each device is waited for, and a silent one alone no lon
     CHECK(ports[1 - silent].waits == std::vector{2000, 2000, 2000, 2000});
   }
 }
+
+}  // namespace kerf::two_arms_loop_test

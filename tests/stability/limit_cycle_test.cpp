@@ -8,8 +8,7 @@
 
 #include <doctest/doctest.h>
 
-using namespace kerf;
-
+namespace kerf::limit_cycle_test {
 namespace {
 
 constexpr std::int64_t kLimit = 16'000, kSettled = 200;
@@ -160,3 +159,5 @@ TEST_CASE("where the energy begins does not count, in a run of any length, and a
     CHECK(rest.port_minimum_mj == -3);
   }
 }
+
+}  // namespace kerf::limit_cycle_test

@@ -14,8 +14,7 @@
 #include "controller/stability/limit_cycle.hpp"
 #include "controller/stability/sampled_loop.hpp"
 
-using namespace kerf;
-
+namespace kerf::one_axis_test {
 namespace {
 
 constexpr double kSi = 1e-3;  // N/m to N/mm, N s/m to N s/mm
@@ -258,3 +257,5 @@ TEST_CASE("without a force the axis coasts as its equation says, whatever the de
         doctest::Approx(std::exp(-decay * t) * (std::cos(w * t) + decay / w * std::sin(w * t)))
             .epsilon(1e-9));
 }
+
+}  // namespace kerf::one_axis_test

@@ -8,9 +8,8 @@
 
 #include "controller/stability/sampled_loop.hpp"
 
+namespace kerf::passive_limits_test {
 namespace {
-
-using kerf::SampledLoop;
 
 SampledLoop at_1_khz() {
   SampledLoop loop;
@@ -103,3 +102,5 @@ TEST_CASE("friction bounds what quantisation may give") {
   loop.quantum_mm = 0;
   CHECK(kerf::quantum_stiffness(loop) == doctest::Approx(200));
 }
+
+}  // namespace kerf::passive_limits_test

@@ -8,12 +8,8 @@
 
 #include "controller/stability/sampled_loop.hpp"
 
+namespace kerf::stable_gains_test {
 namespace {
-
-using kerf::highest_damping;
-using kerf::highest_stiffness;
-using kerf::is_stable;
-using kerf::SampledLoop;
 
 constexpr double kMassKg = 0.045;
 constexpr double kPeriodS = 0.001;
@@ -206,3 +202,5 @@ TEST_CASE("the ends of what a scene can ask for give numbers") {
     }
   }
 }
+
+}  // namespace kerf::stable_gains_test

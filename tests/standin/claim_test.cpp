@@ -9,6 +9,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+namespace kerf::claim_test {
+
 using kerf::standin::Claim;
 
 namespace {
@@ -74,3 +76,5 @@ TEST_CASE("a child keeps nothing that its parent gave back, and gives back nothi
   waitpid(child, nullptr, 0);
   std::filesystem::remove(path);
 }
+
+}  // namespace kerf::claim_test

@@ -10,6 +10,7 @@
 #include <HDU/hduVector.h>
 #include <doctest/doctest.h>
 
+namespace kerf::hdu_test {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -170,3 +171,5 @@ TEST_CASE("HDU takes the rotation out of a matrix that moves and scales, also in
   m.getRotationMatrix(m);
   CHECK(off(m, turn) < 1e-15);
 }
+
+}  // namespace kerf::hdu_test

@@ -8,8 +8,9 @@
 #include "standin/dhd/numbers.hpp"
 #include "standin/hd/touch_kinematics.hpp"
 
+namespace kerf::kinematics_test {
+
 using namespace kerf::hd;  // NOLINT(google-build-using-namespace)
-using kerf::DeviceVec;
 
 namespace {
 
@@ -78,3 +79,5 @@ TEST_CASE("the axes of dhd are those of two clients: x to the user, y right, z u
   CHECK(up == DeviceVec<double>{0, 1, 0});
   CHECK(kerf::dhd::to_dhd({1, 2, 3}) == std::array<double, 3>{3, 1, 2});
 }
+
+}  // namespace kerf::kinematics_test

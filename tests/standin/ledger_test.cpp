@@ -9,6 +9,8 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
+namespace kerf::ledger_test {
+
 using kerf::standin::Ledger;
 using kerf::standin::Row;
 
@@ -48,3 +50,5 @@ TEST_CASE("sums of two threads lose nothing") {
   other.join();
   CHECK(std::bit_cast<double>(ledger.count(Row::square_sum_n2)) == 40'000);
 }
+
+}  // namespace kerf::ledger_test

@@ -7,8 +7,7 @@
 
 #include <doctest/doctest.h>
 
-namespace standin = kerf::standin;
-
+namespace kerf::settings_test {
 namespace {
 
 std::string refusal_of(const std::string& text) {
@@ -142,3 +141,5 @@ TEST_CASE("wrong settings are refused in one line that names the part") {
     CHECK(line.find('\n') == std::string::npos);
   }
 }
+
+}  // namespace kerf::settings_test

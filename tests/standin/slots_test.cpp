@@ -8,6 +8,8 @@
 
 #include <doctest/doctest.h>
 
+namespace kerf::slots_test {
+
 using kerf::dhd::Slots;
 
 TEST_CASE("commands at one time, of any number of threads, get slots one after the other") {
@@ -59,3 +61,5 @@ TEST_CASE("a command within its slot leaves at once, and the next slot is not la
   CHECK(late.at_ns == 1599);
   CHECK(late.missed == 2);
 }
+
+}  // namespace kerf::slots_test

@@ -11,8 +11,9 @@
 #include "standin/hd/motor_heat.hpp"
 #include "standin/hd/touch_kinematics.hpp"
 
+namespace kerf::wrist_test {
+
 using namespace kerf::hd;  // NOLINT(google-build-using-namespace)
-using kerf::DeviceVec;
 
 namespace {
 
@@ -181,3 +182,5 @@ TEST_CASE("a motor warms up by the square of its torque, and cools down") {
   run({}, 120);
   CHECK(heat.hottest() < 1e-3);
 }
+
+}  // namespace kerf::wrist_test

@@ -16,6 +16,8 @@
 #include "tests/studies/studies_line.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::extremes_test {
+
 using namespace kerf::extremes;
 using kerf::test::studies, kerf::test::LabAnswer;
 
@@ -150,3 +152,5 @@ TEST_CASE("exact contact on a smooth ball is where and how the ball is") {
     CHECK(degrees_between(touch.normal(centre, up), up) < 1);
   }
 }
+
+}  // namespace kerf::extremes_test

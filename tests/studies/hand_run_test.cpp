@@ -6,6 +6,8 @@
 
 #include "tests/studies/contact/hands.hpp"
 
+namespace kerf::hand_run_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -45,3 +47,5 @@ TEST_CASE("only windows wholly in contact count") {
   CHECK(chatter_of(pressed(0.03, 300, 900), 150).share == 0);
   CHECK(chatter_of({}, 150).windows == 0);
 }
+
+}  // namespace kerf::hand_run_test

@@ -14,6 +14,8 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
+namespace kerf::program_test {
+
 using kerf::test::cases_in, kerf::test::has, kerf::test::kBin, kerf::test::LabAnswer,
     kerf::test::Process, kerf::test::studies, kerf::test::TemporaryFolder;
 using namespace std::chrono_literals;
@@ -55,3 +57,5 @@ TEST_CASE("ranges that is asked to end leaves nothing behind") {
   CHECK(process.wait() == 130);
   CHECK(files() == 1);  // the log
 }
+
+}  // namespace kerf::program_test

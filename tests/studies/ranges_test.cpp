@@ -24,7 +24,8 @@
 #include "tests/studies/ranges/rules.hpp"
 #include "tests/studies/studies_line.hpp"
 
-using namespace kerf;
+namespace kerf::ranges_test {
+
 using namespace kerf::ranges;
 
 namespace {
@@ -274,3 +275,5 @@ TEST_CASE("a run in two halves ends alike, and cuts, fades in and books as it sh
     CHECK(run.longest_ramp == run.shortest_ramp);
   }
 }
+
+}  // namespace kerf::ranges_test

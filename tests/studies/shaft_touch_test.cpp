@@ -10,7 +10,8 @@
 #include "tests/rig/exact_contact.hpp"
 #include "tests/rig/geometry.hpp"
 
-using namespace kerf;
+namespace kerf::shaft_touch_test {
+
 using namespace kerf::extremes;
 
 namespace {
@@ -75,3 +76,5 @@ TEST_CASE("an edge bears a press along the flank's normal, whatever its faces' a
 TEST_CASE("a shaft in air bears nothing") {
   CHECK(head_fraction([](Point p) { return p[1] - 23; }, {0, 1, 0}) == 1);
 }
+
+}  // namespace kerf::shaft_touch_test

@@ -11,11 +11,7 @@
 
 #include <doctest/doctest.h>
 
-using kerf::Arguments;
-using kerf::CommandLine;
-using kerf::Option;
-using kerf::UsageError;
-
+namespace kerf::command_line_test {
 namespace {
 
 /// What was parsed: "go on", what --help or --version printed, or the refusal.
@@ -190,3 +186,5 @@ TEST_CASE("a program with commands needs one, which has its own options and the 
   CHECK(run({"show", "--help"}).find("shows\nUsage: kerf-commands show [OPTIONS] FILE") == 0);
   CHECK(run({"show", "--help"}).ends_with("The end.\n"));
 }
+
+}  // namespace kerf::command_line_test

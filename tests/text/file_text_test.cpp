@@ -7,7 +7,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using kerf::text_in;
+namespace kerf::file_text_test {
 
 TEST_CASE("a file's bytes come whole; what cannot be read has none") {
   const kerf::test::TemporaryFolder folder;
@@ -20,3 +20,5 @@ TEST_CASE("a file's bytes come whole; what cannot be read has none") {
   REQUIRE(mkfifo((folder / "pipe").c_str(), 0600) == 0);
   CHECK(text_in(folder / "pipe").empty());  // and does not wait for a writer
 }
+
+}  // namespace kerf::file_text_test

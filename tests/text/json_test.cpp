@@ -10,10 +10,7 @@
 
 #include <doctest/doctest.h>
 
-using kerf::doubled_key;
-using kerf::Json;
-using kerf::JsonError;
-
+namespace kerf::json_test {
 namespace {
 
 std::string error_of(const auto& read) {
@@ -147,3 +144,5 @@ TEST_CASE("a name that stands twice in one object is found, at any depth") {
   CHECK(doubled_key(R"({"a": 1, "a": )") == std::nullopt);  // no JSON
   CHECK(doubled_key("[1, 2]") == std::nullopt);
 }
+
+}  // namespace kerf::json_test

@@ -5,7 +5,7 @@
 
 #include "shared/text/command_line.hpp"
 
-using namespace kerf;
+namespace kerf::manual_test {
 
 TEST_CASE(
     "a manual of a command line has all that was declared, and nothing that roff would obey") {
@@ -39,3 +39,5 @@ TEST_CASE(
   has(script, "cut) options='-h --help --kind --depth' ;;\n");
   has(script, "'') options='-h --help --version cut' ;;\n");
 }
+
+}  // namespace kerf::manual_test

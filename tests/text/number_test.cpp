@@ -3,7 +3,7 @@
 
 #include "shared/text/text.hpp"
 
-using kerf::number_in;
+namespace kerf::number_test {
 
 TEST_CASE("the whole text must be a finite number") {
   CHECK(number_in("0.125") == 0.125);
@@ -13,3 +13,5 @@ TEST_CASE("the whole text must be a finite number") {
     CHECK_FALSE(number_in(text));
   }
 }
+
+}  // namespace kerf::number_test

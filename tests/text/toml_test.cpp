@@ -8,7 +8,7 @@
 
 #include "shared/text/text.hpp"
 
-using namespace kerf;
+namespace kerf::toml_test {
 
 TEST_CASE("a tree keeps the order, the places and the types of its file") {
   const TomlNode file = parse_toml("b = 2\n[t]\na = 0.5\nflag = true\n[[list]]\nword = 'x'\n");
@@ -44,3 +44,5 @@ TEST_CASE("long values and strange characters stay on one readable line") {
   CHECK(file.find("c")->shown == '"' + std::string(59, 'z') + "...");
   CHECK(listed(std::vector<std::string>{"a", "b"}) == "a, b");
 }
+
+}  // namespace kerf::toml_test

@@ -5,8 +5,7 @@
 
 #include "shared/text/text.hpp"
 
-using kerf::escaped;
-using kerf::one_line;
+namespace kerf::words_test {
 
 TEST_CASE("control characters stand as in C, all else stays") {
   CHECK(escaped("/home/a b/Zähne.nrrd") == "/home/a b/Zähne.nrrd");
@@ -26,3 +25,5 @@ TEST_CASE("what is quoted of a file is cut where nobody would read on") {
   CHECK(one_line("a\nb") == "a\\nb");
   CHECK(one_line(std::string(1000, 'x')).size() == 400);
 }
+
+}  // namespace kerf::words_test

@@ -26,7 +26,8 @@
 #include "tests/scene/support.hpp"
 #include "tests/tool/stl_support.hpp"
 
-using namespace kerf;
+namespace kerf::tool_mesh_test {
+
 using namespace kerf::extremes;
 
 using test::binary_stl;
@@ -638,3 +639,5 @@ TEST_CASE("a square bar, which no shape is, rests within the limits of the shape
   const SceneTool bar = mesh_of_units("mesh", prism(6, 16, 4));
   CHECK(rest_on_flats(bar, bar).off < 0.075);
 }
+
+}  // namespace kerf::tool_mesh_test

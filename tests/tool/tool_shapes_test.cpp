@@ -17,7 +17,8 @@
 #include "tests/support/errors.hpp"
 #include "tests/support/property.hpp"
 
-using namespace kerf;
+namespace kerf::tool_shapes_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -384,3 +385,5 @@ TEST_CASE("small tools get finer samples, large ones are refused in one line") {
       "a smaller tool or coarser voxels than 0.5 mm",
       LoadError);
 }
+
+}  // namespace kerf::tool_shapes_test

@@ -12,7 +12,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::crop_resample_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -245,3 +246,5 @@ TEST_CASE("a spacing that is not positive or gives too many voxels is refused") 
   CHECK_THROWS_AS(static_cast<void>(resample(image, {1, std::nan(""), 1})), LoadError);
   CHECK_THROWS_AS(static_cast<void>(resample(image, {1e-6, 1, 1})), LoadError);
 }
+
+}  // namespace kerf::crop_resample_test

@@ -15,7 +15,8 @@
 #include "controller/volume/phantom.hpp"
 #include "tests/support/voxels.hpp"
 
-using namespace kerf;
+namespace kerf::denoise_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -374,3 +375,5 @@ TEST_CASE("a label map has steps alone; a scan, the phantom, and what is even ar
   const std::vector<Density> numbers(image.labels.begin(), image.labels.end());
   CHECK(is_label_map(image.grid, numbers));
 }
+
+}  // namespace kerf::denoise_test

@@ -9,7 +9,8 @@
 
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::dicom_frames_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -380,3 +381,5 @@ TEST_CASE("slices without positions are put in order by location or number, whic
             }),
             "its 5 slices have neither positions nor numbers"));
 }
+
+}  // namespace kerf::dicom_frames_test

@@ -9,7 +9,8 @@
 
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::dicom_test {
+
 using namespace kerf::test;
 
 TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
@@ -350,3 +351,5 @@ TEST_CASE("images are found below a folder that has none of its own") {
   folder.write("AUTORUN.INF", "a program");
   CHECK(same_values(read_volume(folder.path()), counting<float>()));
 }
+
+}  // namespace kerf::dicom_test

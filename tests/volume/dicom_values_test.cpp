@@ -14,7 +14,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::dicom_values_test {
+
 using namespace kerf::test;
 
 TEST_CASE("tags that concern the display alone change no value") {
@@ -251,3 +252,5 @@ TEST_CASE("a DICOM series reads the same from every codec without loss") {
     CHECK(has(refusal(folder.path()), "slice1: voxels are missing or broken"));
   }
 }
+
+}  // namespace kerf::dicom_values_test

@@ -10,7 +10,8 @@
 #include "controller/input/load_error.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::folder_files_test {
+
 using namespace kerf::test;
 using volume::FolderFiles, volume::VolumeKind;
 
@@ -109,3 +110,5 @@ TEST_CASE("a folder without images, or without files, has none") {
   CHECK(files_of({"notes.txt"}).kind == VolumeKind::dicom_series);  // its reader refuses
   CHECK(files_of({}).files.empty());
 }
+
+}  // namespace kerf::folder_files_test

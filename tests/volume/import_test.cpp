@@ -21,7 +21,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::import_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -391,3 +392,5 @@ TEST_CASE("a PNG has the bytes that its standard asks for") {
   CHECK(bytes.substr(29, 4) == "\x90\x77\x53\xde");  // the checksum of every picture of 1 x 1
   CHECK(bytes.substr(bytes.size() - 12) == std::string("\0\0\0\0IEND\xae\x42\x60\x82", 12));
 }
+
+}  // namespace kerf::import_test

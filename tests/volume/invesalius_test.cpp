@@ -13,7 +13,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::invesalius_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -237,3 +238,5 @@ TEST_CASE("the skull of Debian's invesalius-examples is read") {
   CHECK(enamel.sum[1] / enamel.count < bone.sum[1] / bone.count - 20);
   CHECK(enamel.sum[2] / enamel.count < bone.sum[2] / bone.count - 20);
 }
+
+}  // namespace kerf::invesalius_test

@@ -11,7 +11,8 @@
 
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::meta_test {
+
 using namespace kerf::test;
 
 // Each volume is 3 x 4 x 5 numbered voxels: value and position of every one are checked.
@@ -213,3 +214,5 @@ TEST_CASE("MetaImage: an origin beyond 1 km is refused, and one at it is not") {
               "its origin is farther than 1 km; correct the header"));
   }
 }
+
+}  // namespace kerf::meta_test

@@ -9,7 +9,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::nifti_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -350,3 +351,5 @@ TEST_CASE("a packed NIfTI is good to its checksum") {
   CHECK(has(refusal_of(packed, "a.nii.gz"),
             "a.nii.gz: cannot be read (its packed bytes are broken)"));
 }
+
+}  // namespace kerf::nifti_test

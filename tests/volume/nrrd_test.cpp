@@ -11,7 +11,8 @@
 
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::nrrd_test {
+
 using namespace kerf::test;
 
 // Each volume is 3 x 4 x 5 numbered voxels: value and position of every one are checked.
@@ -415,3 +416,5 @@ TEST_CASE("NRRD: a number, a word or a field that cannot be is refused by its na
   check_refusal(with("3 4 5", "3 4 -5"), "is empty");
   check_refusal(with("sizes: 3 4 5\n", ""), "sizes is missing");
 }
+
+}  // namespace kerf::nrrd_test

@@ -18,7 +18,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::phantom_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -296,3 +297,5 @@ TEST_CASE("any two labels' colours differ for every kind of colour vision") {
   }
   CHECK(label_colour(kLabelColours + 1) == label_colour(1));
 }
+
+}  // namespace kerf::phantom_test

@@ -14,7 +14,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::proposal_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -272,3 +273,5 @@ TEST_CASE("a body's mask holds the body and not the couch that touches it") {
   CHECK_FALSE(mask.contains(5, 70, 48));
   CHECK_FALSE(mask.contains(90, 71, 48));
 }
+
+}  // namespace kerf::proposal_test

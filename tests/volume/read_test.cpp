@@ -25,7 +25,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::read_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -534,3 +535,5 @@ TEST_CASE("the reader of a small file takes little memory, whatever the file pro
   CHECK(after.ru_maxrss < most_kib);
 #endif
 }
+
+}  // namespace kerf::read_test

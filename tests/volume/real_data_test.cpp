@@ -8,7 +8,8 @@
 #include "controller/volume/windowing.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::real_data_test {
+
 using kerf::test::real_data;
 
 namespace {
@@ -90,3 +91,5 @@ TEST_CASE("the noise of the real scans, and the passes that it takes") {
     CHECK_FALSE(is_label_map(image.grid, image.density));
   }
 }
+
+}  // namespace kerf::real_data_test

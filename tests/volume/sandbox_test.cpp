@@ -27,7 +27,8 @@
 #include "controller/input/load_error.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::sandbox_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -360,3 +361,5 @@ TEST_CASE("a limit of file sizes, which is one of shared memory too, is told as 
   std::signal(SIGXFSZ, kept);
   CHECK(told == "a.vol: no 1 MiB of memory for it (File too large); raise ulimit -f");
 }
+
+}  // namespace kerf::sandbox_test

@@ -12,7 +12,8 @@
 
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::slice_stack_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -275,3 +276,5 @@ TEST_CASE("a file without a header is refused where its size is not that of the 
   CHECK(has(refused({kSmall, VoxelType::uint16, false, 200}), "0 bytes of voxels"));
   CHECK(refused({{1024, 1024, 1024}, VoxelType::float64}) != "no error");
 }
+
+}  // namespace kerf::slice_stack_test

@@ -4,7 +4,8 @@
 #include "controller/volume/file/volume_image.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::tiff_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -275,3 +276,5 @@ TEST_CASE("pages of several channels or times, or fewer pages than images, are n
   check_counting(read(described("{\"shape\": [1, 5, 4, 3], \"axes\": \"CZYX\"}")));
   check_counting(read(described("{\"shape\": [4, 3]}")));
 }
+
+}  // namespace kerf::tiff_test

@@ -16,7 +16,8 @@
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::volume_tool_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -249,3 +250,5 @@ TEST_CASE("the time to read has both ends of its range") {
   CHECK(run({"info", blob, "--read-seconds", "0"}).code == 2);
   CHECK(run({"info", blob, "--read-seconds", "86401"}).code == 2);
 }
+
+}  // namespace kerf::volume_tool_test

@@ -14,7 +14,8 @@
 #include "tests/support/property.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::windowing_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -284,3 +285,5 @@ TEST_CASE("a new file that is not committed never appears") {
   }
   CHECK(folder.count() == 0);
 }
+
+}  // namespace kerf::windowing_test

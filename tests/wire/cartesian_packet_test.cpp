@@ -10,11 +10,9 @@
 #include "shared/wire/cartesian.hpp"
 #include "tests/wire/hex.hpp"
 
+namespace kerf::cartesian_packet_test {
 namespace {
 
-namespace cartesian = kerf::cartesian;
-using kerf::CartesianCommand;
-using kerf::CartesianReport;
 using kerf::test::Bytes;
 using kerf::test::from_hex;
 
@@ -115,3 +113,5 @@ TEST_CASE("every orientation that is packed is read again, within half a step of
     }
   }));
 }
+
+}  // namespace kerf::cartesian_packet_test

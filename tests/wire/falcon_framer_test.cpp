@@ -6,6 +6,8 @@
 
 #include "shared/wire/falcon.hpp"
 
+namespace kerf::falcon_framer_test {
+
 using kerf::falcon::Framer;
 
 namespace {
@@ -54,3 +56,5 @@ TEST_CASE("sixteen bytes that do not end as a packet are none") {
   CHECK(packets_in(framer, {packet.begin(), packet.end()}).empty());
   CHECK(framer.strays() == 16);
 }
+
+}  // namespace kerf::falcon_framer_test

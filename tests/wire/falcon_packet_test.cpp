@@ -10,10 +10,9 @@
 
 #include "shared/wire/falcon.hpp"
 
+namespace kerf::falcon_packet_test {
 namespace {
 
-using kerf::FalconCommand;
-using kerf::FalconReport;
 using kerf::falcon::PacketBytes;
 
 constexpr PacketBytes bytes_of(std::string_view text) {
@@ -104,3 +103,5 @@ TEST_CASE("the Falcon's count is 0.036435 degrees of a thigh") {
   CHECK(kerf::falcon::kRadPerCount / kerf::falcon::kRadPerDegree ==
         doctest::Approx(0.036435).epsilon(1e-5));
 }
+
+}  // namespace kerf::falcon_packet_test

@@ -12,11 +12,7 @@
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
 
-using kerf::decode_hello;
-using kerf::discord;
-using kerf::LinkHello;
-using kerf::Personality;
-
+namespace kerf::hello_test {
 namespace {
 
 constexpr LinkHello kOmni{Personality::omni, false, 1000};
@@ -78,3 +74,5 @@ TEST_CASE("what two sides differ in is told with both, and what to start instead
   CHECK(is_told(rate));
   CHECK(rate.find("1000 Hz in the controller, at 2000 Hz in the emulator") != std::string::npos);
 }
+
+}  // namespace kerf::hello_test

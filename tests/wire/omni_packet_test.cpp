@@ -10,10 +10,9 @@
 #include "shared/wire/omni.hpp"
 #include "tests/wire/hex.hpp"
 
+namespace kerf::omni_packet_test {
 namespace {
 
-using kerf::OmniCommand;
-using kerf::OmniReport;
 using kerf::test::Bytes;
 using kerf::test::from_hex;
 
@@ -138,3 +137,5 @@ TEST_CASE("16 bytes that are no command are refused") {
     CHECK_FALSE(kerf::decode_command(bad));
   }
 }
+
+}  // namespace kerf::omni_packet_test

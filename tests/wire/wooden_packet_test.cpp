@@ -9,10 +9,9 @@
 
 #include "shared/wire/woodenhaptics.hpp"
 
+namespace kerf::wooden_packet_test {
 namespace {
 
-using kerf::WoodenCommand;
-using kerf::WoodenReport;
 using Short = std::array<std::uint8_t, kerf::wooden::kPacketBytes>;
 
 constexpr Short first_14(const kerf::wooden::PacketBytes& bytes) {
@@ -90,3 +89,5 @@ TEST_CASE("the wireless button stands on encoder d") {
     CHECK(wireless_button(static_cast<std::int16_t>(d + 10000)));
   }
 }
+
+}  // namespace kerf::wooden_packet_test

@@ -31,7 +31,8 @@
 #include "tests/servo/support.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-using namespace kerf;
+namespace kerf::igtl_test {
+
 using namespace kerf::bridge;
 using namespace kerf::test;
 using std::chrono::milliseconds;
@@ -521,3 +522,5 @@ TEST_CASE("device names are the scene's, at most 20 bytes, and no two alike") {
   segment.scene_json = "{";
   CHECK(device_names(segment)[4] == "volume 5");
 }
+
+}  // namespace kerf::igtl_test

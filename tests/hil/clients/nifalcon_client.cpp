@@ -12,7 +12,7 @@ namespace {
 
 using falcon::FtdiRequest;
 
-constexpr unsigned kPatienceMs = 1000;
+constexpr unsigned kTransferMs = 1000;
 constexpr int kQuestions = 10;
 constexpr int kLooks = 100;
 constexpr std::size_t kGreetingRoom = 512 - falcon::kFtdiStatusBytes;
@@ -65,7 +65,7 @@ void NifalconClient::open_first() {
 void NifalconClient::control(FtdiRequest request, std::uint16_t value) {
   check("libusb_control_transfer", libusb_control_transfer(handle_, falcon::kFtdiRequestType,
                                                            static_cast<std::uint8_t>(request),
-                                                           value, 0, nullptr, 0, kPatienceMs));
+                                                           value, 0, nullptr, 0, kTransferMs));
 }
 
 void NifalconClient::purge() {
@@ -99,7 +99,7 @@ std::size_t NifalconClient::write(std::span<const std::uint8_t> bytes) {
   // libusb's buffer is not const, because the same call reads.
   check("libusb_bulk_transfer",
         libusb_bulk_transfer(handle_, falcon::kEndpointOut, const_cast<std::uint8_t*>(bytes.data()),
-                             static_cast<int>(bytes.size()), &sent, kPatienceMs));
+                             static_cast<int>(bytes.size()), &sent, kTransferMs));
   return static_cast<std::size_t>(sent);
 }
 
@@ -108,7 +108,7 @@ std::span<const std::uint8_t> NifalconClient::read(std::size_t room) {
   check(
       "libusb_bulk_transfer",
       libusb_bulk_transfer(handle_, falcon::kEndpointIn, packet_.data(),
-                           static_cast<int>(room + falcon::kFtdiStatusBytes), &size, kPatienceMs));
+                           static_cast<int>(room + falcon::kFtdiStatusBytes), &size, kTransferMs));
   const auto bytes = std::span(packet_).first(static_cast<std::size_t>(size));
   return bytes.subspan(std::min(bytes.size(), falcon::kFtdiStatusBytes));
 }
@@ -161,7 +161,7 @@ void NifalconClient::ask_to_read() {
   came_ = false;
   if (reading_) return;
   libusb_fill_bulk_transfer(transfer_, handle_, falcon::kEndpointIn, in_.data(),
-                            static_cast<int>(in_.size()), read_ended, this, kPatienceMs);
+                            static_cast<int>(in_.size()), read_ended, this, kTransferMs);
   check("libusb_submit_transfer", libusb_submit_transfer(transfer_));
   reading_ = true;
 }

@@ -28,12 +28,9 @@
 #include "tests/hil/run_emulator.hpp"
 #include "tests/support/child.hpp"
 
+namespace kerf::every_bus_test {
 namespace {
 
-using kerf::Emulator;
-using kerf::FaultKind;
-using kerf::Personality;
-using kerf::ServoOutput;
 using kerf::test::EmulatorRun;
 using kerf::test::kGoOn;
 using kerf::test::kKilledBySignal;
@@ -373,3 +370,5 @@ TEST_CASE("whenever the device ends its side of a bus, the motors are off in tim
     play_on_each_bus({.faults = {{.kind = FaultKind::hang_up, .at_s = 0.02 + 0.037 * end}}});
   }
 }
+
+}  // namespace kerf::every_bus_test

@@ -11,8 +11,8 @@
 
 #include "tests/hil/fuse/firewire_bench.hpp"
 
-using kerf::BusFault;
-using kerf::FirewireSettings;
+namespace kerf::firewire_bus_test {
+
 using kerf::test::Bench;
 using kerf::test::Check;
 using kerf::test::kControl;
@@ -164,3 +164,5 @@ const Check kChecks[] = {
 TEST_CASE("resources, resets and loss are reported as by the kernel's firewire-cdev") {
   kerf::test::run(kChecks);
 }
+
+}  // namespace kerf::firewire_bus_test

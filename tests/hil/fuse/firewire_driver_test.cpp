@@ -15,10 +15,8 @@
 #include "tests/hil/fuse/bus_session.hpp"
 #include "tests/support/errors.hpp"
 
-using kerf::BusFault;
-using kerf::FirewireOptions;
-using kerf::FirewireSettings;
-using kerf::ScriptedFault;
+namespace kerf::firewire_driver_test {
+
 using kerf::test::Course;
 using kerf::test::FirewireSession;
 using kerf::test::kGoOn;
@@ -302,3 +300,5 @@ TEST_CASE("one of two devices dies, the other one runs on") {
   CHECK(right_fresh < 310);
   CHECK(right_port.closed());
 }
+
+}  // namespace kerf::firewire_driver_test

@@ -14,7 +14,8 @@
 #include "shared/wire/omni.hpp"
 #include "tests/hil/fuse/firewire_bench.hpp"
 
-using kerf::FirewireSettings;
+namespace kerf::firewire_iso_test {
+
 using kerf::test::Bench;
 using kerf::test::Check;
 using kerf::test::kReceive;
@@ -282,3 +283,5 @@ TEST_CASE("in real time a sleeping poll is woken by an interrupt, and the stream
   CHECK(lost == 0);
   CHECK(took_ms > 399);  // 3200 packets at 8 kHz cannot come sooner
 }
+
+}  // namespace kerf::firewire_iso_test

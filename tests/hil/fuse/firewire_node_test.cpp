@@ -14,6 +14,8 @@
 
 #include "tests/hil/fuse/firewire_bench.hpp"
 
+namespace kerf::firewire_node_test {
+
 using kerf::test::Bench;
 using kerf::test::Check;
 using kerf::test::kControl;
@@ -195,3 +197,5 @@ TEST_CASE("nonsense from a client never ends the server") {
   const PlainClient fresh(bench.mounted.path());
   CHECK(fresh.info() == 1);
 }
+
+}  // namespace kerf::firewire_node_test

@@ -18,6 +18,8 @@
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/hil/fuse/spread.hpp"
 
+namespace kerf::firewire_timing_test {
+
 using kerf::test::Spread;
 using kerf::test::spread_of;
 
@@ -125,3 +127,5 @@ TEST_CASE("a tick reads packets of the last two cycles, and its command arrives 
     CHECK(f.loop_cycles.p50 <= (c.fill ? 12 : 8));
   }
 }
+
+}  // namespace kerf::firewire_timing_test

@@ -12,11 +12,9 @@
 #include "controller/loop/motor_guard.hpp"
 #include "tests/hil/fuse/bus_session.hpp"
 
+namespace kerf::guard_test {
 namespace {
 
-using kerf::BusFault;
-using kerf::Personality;
-using kerf::UsbFault;
 using kerf::test::kGoOn;
 
 /// Guarded ticks of a driver on the bus at `text`, until it is gone, at most 2000. Returns the name
@@ -74,3 +72,5 @@ TEST_CASE("the guard ends a loop that makes another call, on each bus") {
   const kerf::test::MountedArm arm;
   CHECK(unexpected_call(Personality::woodenhaptics, arm.port(), true) == "getppid");
 }
+
+}  // namespace kerf::guard_test

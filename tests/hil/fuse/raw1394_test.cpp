@@ -25,6 +25,8 @@
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/hil/fuse/plain_client.hpp"
 
+namespace kerf::raw1394_test {
+
 using kerf::test::PlainClient;
 using kerf::test::Raw1394Client;
 
@@ -181,3 +183,5 @@ TEST_CASE("raw1394: our own driver finds the Omni beside the card, and both shar
   CHECK(mmap(nullptr, 4096, PROT_READ, MAP_SHARED, card.fd(), 0) == MAP_FAILED);
   CHECK(errno == ENODEV);
 }
+
+}  // namespace kerf::raw1394_test

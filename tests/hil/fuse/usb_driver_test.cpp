@@ -27,11 +27,8 @@
 #include "tests/hil/fuse/bus_session.hpp"
 #include "tests/support/errors.hpp"
 
-using kerf::HidPort;
-using kerf::PacketPort;
-using kerf::Personality;
-using kerf::UsbFault;
-using kerf::UsbPort;
+namespace kerf::usb_driver_test {
+
 using kerf::test::Course;
 using kerf::test::error_of;
 using kerf::test::has;
@@ -438,3 +435,5 @@ TEST_CASE("usb, hid: one of two devices dies, the other's force and timing stay 
   CHECK(std::ranges::min(after_n) > std::ranges::min(before_n) * 0.9);
   CHECK(std::ranges::max(after_n) < std::ranges::max(before_n) * 1.1);
 }
+
+}  // namespace kerf::usb_driver_test

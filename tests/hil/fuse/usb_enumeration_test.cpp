@@ -22,8 +22,8 @@
 #include "shared/wire/woodenhaptics.hpp"
 #include "tests/hil/fuse/bus_session.hpp"
 
-using kerf::HidPort;
-using kerf::UsbPort;
+namespace kerf::usb_enumeration_test {
+
 using kerf::test::kGoOn;
 using kerf::test::MountedArm;
 using kerf::test::MountedFalcon;
@@ -203,3 +203,5 @@ TEST_CASE("enumeration: WoodenHaptics of either firmware, distinguished in the s
     CHECK(answers(by_node));
   });
 }
+
+}  // namespace kerf::usb_enumeration_test

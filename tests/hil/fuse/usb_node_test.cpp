@@ -23,7 +23,8 @@
 #include "tests/hil/clients/nifalcon_client.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 
-using kerf::UsbFault;
+namespace kerf::usb_node_test {
+
 using kerf::test::MountedArm;
 using kerf::test::MountedFalcon;
 using kerf::test::NifalconClient;
@@ -332,3 +333,5 @@ TEST_CASE(
   NifalconClient client(coming.fd());
   CHECK(client.firmware_answers());
 }
+
+}  // namespace kerf::usb_node_test

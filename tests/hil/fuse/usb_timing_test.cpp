@@ -24,6 +24,8 @@
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/hil/fuse/spread.hpp"
 
+namespace kerf::usb_timing_test {
+
 using kerf::test::Spread;
 using kerf::test::spread_of;
 
@@ -193,3 +195,5 @@ TEST_CASE("libusb and hidapi through FUSE: a command and its answer cost far les
                                                arm);
   measure("hid:", arm, hid, ticks);
 }
+
+}  // namespace kerf::usb_timing_test

@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+namespace kerf::guarded_heap_test {
 namespace {
 
 using Sizes = std::initializer_list<std::size_t>;
@@ -116,3 +117,5 @@ TEST_CASE("it is a heap: contents move along, alignment holds, and many blocks m
   const auto* const zeroes = static_cast<const char*>(std::calloc(100, 100));
   CHECK(std::string(zeroes, 10'000) == std::string(10'000, '\0'));
 }
+
+}  // namespace kerf::guarded_heap_test

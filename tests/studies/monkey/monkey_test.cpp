@@ -11,7 +11,8 @@
 #include "tests/support/temporary_folder.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::monkey_test {
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -70,3 +71,5 @@ TEST_CASE("a monkey with the same seed does the same, and sees the same") {
   const bool same = seen[0] == seen[1];
   CHECK(same);
 }
+
+}  // namespace kerf::monkey_test

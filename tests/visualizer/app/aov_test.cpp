@@ -21,7 +21,8 @@
 #include "visualizer/render/renderer.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::aov_test {
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -212,3 +213,5 @@ TEST_CASE("depths and normals are of headless pictures, and normals of surfaces"
           "--aov: --stereo has two pictures in one; leave one of both out");
   CHECK_THROWS_AS(parse({"--aov", "depth"}), VisualizerError);
 }
+
+}  // namespace kerf::aov_test

@@ -7,7 +7,8 @@
 #include "visualizer/app/window_keys.hpp"
 #include "visualizer/panels/overlay.hpp"
 
-using namespace kerf;
+namespace kerf::figures_test {
+
 using namespace std::chrono_literals;
 
 namespace {
@@ -143,3 +144,5 @@ TEST_CASE("the age of data that come no more goes with its next change") {
   rates.show(figures, ShownRates::Clock::time_point(1s + ShownRates::kHold));
   CHECK_FALSE(figures.data_age_ms);
 }
+
+}  // namespace kerf::figures_test

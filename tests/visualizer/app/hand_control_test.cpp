@@ -11,8 +11,7 @@
 
 #include <doctest/doctest.h>
 
-using namespace kerf;
-
+namespace kerf::hand_control_test {
 namespace {
 
 constexpr PictureSize kPixels{400, 300};
@@ -445,3 +444,5 @@ TEST_CASE("a device that never stops talking holds up no frame") {
   CHECK_FALSE(mouse.step(held));
   CHECK(held.right == 1.0);
 }
+
+}  // namespace kerf::hand_control_test

@@ -18,6 +18,8 @@
 #include "tests/visualizer/app/window_fixture.hpp"
 #include "visualizer/scene/session.hpp"
 
+namespace kerf::hand_window_test {
+
 using namespace kerf::test;
 using namespace std::chrono_literals;
 
@@ -346,3 +348,5 @@ TEST_CASE("windows and emulators come and go, and each is told") {
   bench.emulator.reset();
   CHECK(Bench::said(second, "the emulator has gone"));
 }
+
+}  // namespace kerf::hand_window_test

@@ -18,7 +18,8 @@
 #include "visualizer/scene/frame_report.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::headless_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -123,3 +124,5 @@ TEST_CASE("the stopwatch counts processor time while the process works") {
   CHECK(watch.wall_ms() > 0.0);
   CHECK(watch.cpu_ms() >= 5.0);
 }
+
+}  // namespace kerf::headless_test

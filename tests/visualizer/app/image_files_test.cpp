@@ -25,7 +25,8 @@
 #include "tests/visualizer/render/rgb_picture.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::image_files_test {
+
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
@@ -299,3 +300,5 @@ TEST_CASE("a reader that is not there, goes away or takes nothing is told in one
   CHECK(problem_of([&] { video.write_frame(frame); }).find("its reader has gone") !=
         std::string::npos);
 }
+
+}  // namespace kerf::image_files_test

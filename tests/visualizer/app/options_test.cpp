@@ -12,8 +12,7 @@
 #include "visualizer/render/renderer.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
-
+namespace kerf::options_test {
 namespace {
 
 std::optional<VisualizerOptions> parse(std::initializer_list<const char*> arguments) {
@@ -169,3 +168,5 @@ TEST_CASE("a folder in the place of a file of opacities is called a folder") {
   CHECK_THROWS_WITH_AS(parse({"--transfer", "/tmp"}), "/tmp: is a folder; name a file in it",
                        VisualizerError);
 }
+
+}  // namespace kerf::options_test

@@ -13,8 +13,7 @@
 #include "visualizer/gl/context.hpp"
 #include "visualizer/panels/overlay.hpp"
 
-using namespace kerf;
-
+namespace kerf::panels_test {
 namespace {
 
 constexpr PictureSize kPlain{640, 480};
@@ -369,3 +368,5 @@ TEST_CASE("letters are drawn for their size, and are not those of a smaller one 
   }
   CHECK(partly > whole / 10);
 }
+
+}  // namespace kerf::panels_test

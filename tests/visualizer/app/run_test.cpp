@@ -33,7 +33,8 @@
 #include "visualizer/scene/session.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::run_test {
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -580,3 +581,5 @@ TEST_CASE("a video alone ends when its time is over") {
   CHECK(run_headless(options) == 0);
   CHECK(test::text_of(*options.record).find("FRAME") != std::string::npos);
 }
+
+}  // namespace kerf::run_test

@@ -17,7 +17,8 @@
 #include "visualizer/scene/visualizer_error.hpp"
 #include "visualizer/surface/volume_surface.hpp"
 
-using namespace kerf;
+namespace kerf::surface_export_test {
+
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
@@ -202,3 +203,5 @@ TEST_CASE("an export that cannot work is refused in one line, and leaves no file
   check_export(folder / "mesh.ply");
   CHECK(folder.count() == 0);
 }
+
+}  // namespace kerf::surface_export_test

@@ -18,7 +18,8 @@
 #include "visualizer/gl/window.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::window_end_test {
+
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
@@ -131,3 +132,5 @@ TEST_CASE("a window says two minutes and ten seconds before its run ends that it
                      std::chrono::seconds(30)));
   }
 }
+
+}  // namespace kerf::window_end_test

@@ -16,7 +16,8 @@
 #include "visualizer/gl/window.hpp"
 #include "visualizer/picture/image_files.hpp"
 
-using namespace kerf;
+namespace kerf::window_gl_test {
+
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
@@ -170,3 +171,5 @@ TEST_CASE("a driver that is too old is named with its version, and the page is o
     CHECK(said.find('\n') == said.size() - 1);
   }
 }
+
+}  // namespace kerf::window_gl_test

@@ -14,7 +14,8 @@
 #include "visualizer/picture/image_files.hpp"
 #include "visualizer/scene/appearance.hpp"
 
-using namespace kerf;
+namespace kerf::window_test {
+
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
@@ -412,3 +413,5 @@ TEST_CASE("whatever a user does in a window, nothing is written beside a block")
                           .c_str()) == 0);
   }
 }
+
+}  // namespace kerf::window_test

@@ -10,8 +10,7 @@
 #include "visualizer/bench/picture_bench.hpp"
 #include "visualizer/cast/cast_kernels.hpp"
 
-using namespace kerf;
-
+namespace kerf::bench_test {
 namespace {
 
 std::size_t solid_voxels(const BenchTooth& tooth) {
@@ -118,3 +117,5 @@ TEST_CASE("the default gradient shades balls and milled hollows within 3 degrees
     CHECK((row.noisy_angle_deg < 0.5) == (is_default || row.gradient == GradientFilter::farid5));
   }
 }
+
+}  // namespace kerf::bench_test

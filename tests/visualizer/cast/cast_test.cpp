@@ -18,7 +18,8 @@
 #include "visualizer/cast/caster.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::cast_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -323,3 +324,5 @@ TEST_CASE("a pool does each piece once, with any number of workers, again and ag
     }
   }
 }
+
+}  // namespace kerf::cast_test

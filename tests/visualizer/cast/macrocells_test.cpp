@@ -12,7 +12,8 @@
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/render/macrocell_faces.hpp"
 
-using namespace kerf;
+namespace kerf::macrocells_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -205,3 +206,5 @@ TEST_CASE("a list is given room for all faces of cells that take turns") {
   CHECK(faces.all().size() <= CellFaces::most({5, 4, 3}));
   CHECK(faces.active_box() == VoxelBox{{0, 0, 0}, {5, 4, 3}});
 }
+
+}  // namespace kerf::macrocells_test

@@ -8,8 +8,7 @@
 
 #include "visualizer/compose/tool_painter.hpp"
 
-using namespace kerf;
-
+namespace kerf::mesh_test {
 namespace {
 
 std::vector<ProfilePoint> circle_profile(double radius_mm) {
@@ -161,3 +160,5 @@ TEST_CASE("a mesh is drawn as it is: sharp edges stay sharp, and round ones are 
   for (const Mesh::Vertex& vertex : tool.vertices) highest = std::max(highest, vertex.position.y);
   CHECK(highest > 4.0F);  // its shank
 }
+
+}  // namespace kerf::mesh_test

@@ -19,7 +19,8 @@
 #include "visualizer/scene/camera.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::redraw_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -543,3 +544,5 @@ TEST_CASE("bounds on the screen hold all that is inside a box, and the whole scr
   corners = {{100, 0, 0}, {101, 1, 1}};
   CHECK(screen_bounds(corners, wide, size).empty());
 }
+
+}  // namespace kerf::redraw_test

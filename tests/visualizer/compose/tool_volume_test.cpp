@@ -16,7 +16,8 @@
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::tool_volume_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -320,3 +321,5 @@ TEST_CASE(
     }
   }
 }
+
+}  // namespace kerf::tool_volume_test

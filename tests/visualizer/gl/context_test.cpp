@@ -11,7 +11,8 @@
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::context_test {
+
 using namespace kerf::test;
 
 TEST_CASE("a GL error fails the test that makes it" * doctest::should_fail()) {
@@ -66,3 +67,5 @@ TEST_CASE("a software context says that it would tell of its loss") {
   glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
   CHECK(strategy == GL_LOSE_CONTEXT_ON_RESET);
 }
+
+}  // namespace kerf::context_test

@@ -14,7 +14,8 @@
 #include "visualizer/gl/gl_objects.hpp"
 #include "visualizer/gl/target.hpp"
 
-using namespace kerf;
+namespace kerf::guarded_pixels_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -136,3 +137,5 @@ TEST_CASE("pixels that the driver takes are within the memory that holds them") 
     }
   }
 }
+
+}  // namespace kerf::guarded_pixels_test

@@ -11,7 +11,8 @@
 #include "tests/visualizer/render/renderer_fixture.hpp"
 #include "tests/visualizer/render/teeth.hpp"
 
-using namespace kerf;
+namespace kerf::agreement_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -169,3 +170,5 @@ TEST_CASE("two intersecting volumes in slices are those of rays, to the depth of
   CHECK(off.mean < 0.5);
   CHECK(off.most < 24);
 }
+
+}  // namespace kerf::agreement_test

@@ -12,8 +12,10 @@
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/cast/cast_volume.hpp"
 #include "visualizer/redraw/redraw_tiles.hpp"
+#include "visualizer/surface/vertex_shading.hpp"
 
-using namespace kerf;
+namespace kerf::changed_cells_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -162,3 +164,5 @@ TEST_CASE("every instruction set finds the rays that one at a time finds") {
   CHECK(met > 100);
   CHECK(felt > 10);
 }
+
+}  // namespace kerf::changed_cells_test

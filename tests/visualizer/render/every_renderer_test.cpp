@@ -13,7 +13,8 @@
 
 #include "tests/visualizer/render/renderer_fixture.hpp"
 
-using namespace kerf;
+namespace kerf::every_renderer_test {
+
 using namespace kerf::test;
 
 TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing before it") {
@@ -279,3 +280,5 @@ TEST_CASE("surface redraws by changed cells while a plane cuts it open, else by 
     CHECK(tiles.rects().empty() == !open);
   }
 }
+
+}  // namespace kerf::every_renderer_test

@@ -23,7 +23,8 @@
 #include "visualizer/picture/image_files.hpp"
 #include "visualizer/render/renderer.hpp"
 
-using namespace kerf;
+namespace kerf::golden_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -213,3 +214,5 @@ TEST_CASE("a picture is not like one with other pixels, and is like one with oth
   for (std::size_t i = 0; i < 300; ++i) picture.rgb[i] = 104;
   CHECK(likeness(picture, wanted).alike == 0.99);
 }
+
+}  // namespace kerf::golden_test

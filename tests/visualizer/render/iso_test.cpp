@@ -10,7 +10,8 @@
 #include "visualizer/render/translucent_renderers.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::iso_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -150,3 +151,5 @@ TEST_CASE("the part of the force arrow inside the volume shines through and leav
   painter.draw_arrow({0, 0, 0}, {0, 0, 0}, 0.2, {}, view, target);  // no force, no arrow
   CHECK(target.read_rgb() == alone.rgb);
 }
+
+}  // namespace kerf::iso_test

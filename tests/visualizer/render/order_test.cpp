@@ -19,7 +19,8 @@
 #include "visualizer/compose/picture_layers.hpp"
 #include "visualizer/compose/tool_painter.hpp"
 
-using namespace kerf;
+namespace kerf::order_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -283,3 +284,5 @@ TEST_CASE("a tool before, behind and inside volumes is seen as far as what is be
     CHECK((veiled > 50) == translucent);
   }
 }
+
+}  // namespace kerf::order_test

@@ -9,7 +9,8 @@
 #include "tests/visualizer/render/renderer_fixture.hpp"
 #include "visualizer/bench/picture_bench.hpp"
 
-using namespace kerf;
+namespace kerf::second_order_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -99,3 +100,5 @@ TEST_CASE("N12: the normals of iso are of second order in the voxel, from every 
     }
   }
 }
+
+}  // namespace kerf::second_order_test

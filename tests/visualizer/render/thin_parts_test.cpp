@@ -12,7 +12,8 @@
 
 #include "tests/visualizer/render/renderer_fixture.hpp"
 
-using namespace kerf;
+namespace kerf::thin_parts_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -208,3 +209,5 @@ TEST_CASE("iso and cast show parts as thin as a voxel as an exact march does") {
     }
   }
 }
+
+}  // namespace kerf::thin_parts_test

@@ -15,7 +15,8 @@
 #include "visualizer/render/translucent_renderers.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::translucent_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -241,3 +242,5 @@ TEST_CASE("the areas of all cuts add up to the volume of the box") {
     RC_ASSERT(std::abs(sum - volume) < 0.02 * volume + 0.05);
   }));
 }
+
+}  // namespace kerf::translucent_test

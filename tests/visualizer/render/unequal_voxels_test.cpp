@@ -19,7 +19,8 @@
 #include "visualizer/cast/caster.hpp"
 #include "visualizer/surface/volume_surface.hpp"
 
-using namespace kerf;
+namespace kerf::unequal_voxels_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -279,3 +280,5 @@ TEST_CASE(
     }
   }
 }
+
+}  // namespace kerf::unequal_voxels_test

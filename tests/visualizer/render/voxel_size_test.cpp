@@ -13,7 +13,8 @@
 
 #include "tests/visualizer/render/renderer_fixture.hpp"
 
-using namespace kerf;
+namespace kerf::voxel_size_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -188,3 +189,5 @@ TEST_CASE("what is translucent looks nearly the same in voxels of any size") {
     }
   }
 }
+
+}  // namespace kerf::voxel_size_test

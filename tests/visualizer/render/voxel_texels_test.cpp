@@ -6,8 +6,7 @@
 
 #include "visualizer/render/volume_textures.hpp"
 
-using namespace kerf;
-
+namespace kerf::voxel_texels_test {
 namespace {
 
 const GradientPlan kCorners(GradientFilter::corners);
@@ -82,3 +81,5 @@ TEST_CASE(
   const auto part = materials.of({{1, 0, 0}, {12, 1, 1}}, density);
   CHECK(part == std::vector<MaterialTexel>(texels.begin() + 1, texels.begin() + 12));
 }
+
+}  // namespace kerf::voxel_texels_test

@@ -20,7 +20,8 @@
 
 #include "visualizer/sound/spindle_sound.hpp"
 
-using namespace kerf;
+namespace kerf::sound_test {
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -255,3 +256,5 @@ TEST_CASE("no audio device is told once, and later messages go nowhere") {
   for (int i = 0; i < 1000; ++i) link.send({1000, 1, 1}, false);
   CHECK_FALSE(link.heard());
 }
+
+}  // namespace kerf::sound_test

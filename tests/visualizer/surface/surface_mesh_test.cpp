@@ -13,7 +13,8 @@
 #include "tests/visualizer/surface/mesh_checks.hpp"
 #include "visualizer/surface/block_mesh.hpp"
 
-using namespace kerf;
+namespace kerf::surface_mesh_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -248,3 +249,5 @@ TEST_CASE("a vertex has the colour of the label below it, and is darker in a cav
   CHECK(open == 1.0);
   CHECK(deep < 0.5);
 }
+
+}  // namespace kerf::surface_mesh_test

@@ -10,7 +10,8 @@
 
 #include "tests/visualizer/surface/mesh_checks.hpp"
 
-using namespace kerf;
+namespace kerf::surface_on_gpu_test {
+
 using namespace kerf::test;
 
 TEST_CASE("of a block those triangles are picked that touch a part of the picture, and no others") {
@@ -67,8 +68,6 @@ TEST_CASE("of a block those triangles are picked that touch a part of the pictur
   CHECK(picked_for_nothing == 0);
 }
 
-using kerf::RangePool;
-
 TEST_CASE("ranges hold what they were asked for, never overlap, and are used again") {
   RangePool pool;
   std::array<RangePool::Range, 40> ranges{};
@@ -91,3 +90,5 @@ TEST_CASE("ranges hold what they were asked for, never overlap, and are used aga
   CHECK(wrong == 0);
   CHECK(pool.size() < 1.2 * size_half_way);  // what comes and goes takes no new room
 }
+
+}  // namespace kerf::surface_on_gpu_test

@@ -12,7 +12,8 @@
 
 #include "tests/visualizer/surface/mesh_checks.hpp"
 
-using namespace kerf;
+namespace kerf::surface_update_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -171,3 +172,5 @@ TEST_CASE("after rough edits an update equals a fresh mesh, coloured by labels o
     CHECK(triangles_told > 0);
   }
 }
+
+}  // namespace kerf::surface_update_test

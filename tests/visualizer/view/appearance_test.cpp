@@ -17,7 +17,8 @@
 #include "visualizer/render/volume_textures.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::appearance_test {
+
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
@@ -255,3 +256,5 @@ TEST_CASE("new opacities make the picture of a renderer that had them from the s
     }
   }
 }
+
+}  // namespace kerf::appearance_test

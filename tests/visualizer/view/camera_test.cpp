@@ -16,7 +16,8 @@
 #include "visualizer/scene/camera_pose.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
+namespace kerf::camera_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -310,3 +311,5 @@ TEST_CASE("every renderer draws both eyes where the formula says") {
     }
   }
 }
+
+}  // namespace kerf::camera_test

@@ -11,7 +11,8 @@
 #include "tests/support/temporary_folder.hpp"
 #include "visualizer/panels/control_panels.hpp"
 
-using namespace kerf;
+namespace kerf::folder_list_test {
+
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
@@ -79,3 +80,5 @@ TEST_CASE("a file that is no scene is told from one, without reading it all") {
     CHECK(why.find("; choose another file") != std::string::npos);
   }
 }
+
+}  // namespace kerf::folder_list_test

@@ -11,8 +11,7 @@
 #include "visualizer/scene/gradient_plan.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
-
+namespace kerf::gradient_test {
 namespace {
 
 constexpr GradientFilter kAll[]{GradientFilter::central, GradientFilter::corners,
@@ -260,3 +259,5 @@ TEST_CASE("a gradient has a name, and an unknown one is refused") {
   }
   CHECK_THROWS_AS(static_cast<void>(gradient_named("sobel")), VisualizerError);
 }
+
+}  // namespace kerf::gradient_test

@@ -17,7 +17,8 @@
 #include "tests/json.hpp"
 #include "visualizer/scene/gradient_plan.hpp"
 
-using namespace kerf;
+namespace kerf::page_gradient_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -134,3 +135,5 @@ TEST_CASE("filters and gradients of voxels are those that the page is compared w
     check_like(stored["gradients"][i], plan.cell, gradients_of(plan));
   }
 }
+
+}  // namespace kerf::page_gradient_test

@@ -9,8 +9,7 @@
 
 #include "visualizer/scene/visualizer_error.hpp"
 
-using namespace kerf;
-
+namespace kerf::scene_view_test {
 namespace {
 
 SegmentInfo segment_with(const std::string& json) {
@@ -103,3 +102,5 @@ TEST_CASE("a scene text that is not ours is refused in one line, never a crash")
     }
   }));
 }
+
+}  // namespace kerf::scene_view_test

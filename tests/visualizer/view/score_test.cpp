@@ -10,8 +10,7 @@
 #include "visualizer/scene/scene_view.hpp"
 #include "visualizer/scene/session.hpp"
 
-using namespace kerf;
-
+namespace kerf::score_test {
 namespace {
 
 constexpr VoxelGrid kGrid{20, 10, 9};
@@ -143,3 +142,5 @@ TEST_CASE("the colours of Okabe and Ito are given to all materials but none") {
   CHECK(materials[1].colour.b > materials[1].colour.r);  // sky blue
   CHECK(materials[2].colour.r > materials[2].colour.b);  // yellow
 }
+
+}  // namespace kerf::score_test

@@ -13,7 +13,8 @@
 #include "visualizer/compose/tool_painter.hpp"
 #include "visualizer/picture/picture.hpp"
 
-using namespace kerf;
+namespace kerf::two_arms_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -208,3 +209,5 @@ TEST_CASE("a run counts as armed from the first arm that is taken in hand") {
   session.poll();
   CHECK(session.ticks_since_armed() == 1);
 }
+
+}  // namespace kerf::two_arms_test

@@ -14,9 +14,6 @@ namespace kerf::test {
 namespace {
 using vec3::Vec, vec3::operator*, vec3::operator+, vec3::operator-;
 
-constexpr auto kRead = Expected::read, kRefused = Expected::refused, kAsked = Expected::asked,
-               kEither = Expected::read_or_refused;
-
 struct Nifti {
   Draw& draw;
   Written out{};
@@ -260,7 +257,7 @@ constexpr NiftiRow kNiftiRows[] = {
 };
 
 /// A page of a TIFF: what its tags say. Values of more than 4 bytes are kept apart.
-struct TiffPage {
+struct TaggedPage {
   std::map<int, std::pair<int, std::vector<std::uint64_t>>> tags;  ///< type (3 or 4), values
   std::vector<std::string> strips;
 };
@@ -270,14 +267,14 @@ struct Tiff {
   Written out{};
   bool big = false;
   int rows_per_strip = 0;
-  std::vector<TiffPage> pages{};
+  std::vector<TaggedPage> pages{};
 };
 
 constexpr int kSubfile = 254, kWidth = 256, kHeight = 257, kBits = 258, kPacking = 259,
               kPhotometric = 262, kOrientation = 274, kSamples = 277, kFormat = 339;
 
-TiffPage tiff_page(const Numbered& v, int k, int rows_per_strip) {
-  TiffPage page;
+TaggedPage tiff_page(const Numbered& v, int k, int rows_per_strip) {
+  TaggedPage page;
   const int kind = v.type >= VoxelType::float32 ? 3 : static_cast<int>(v.type) % 2 == 1 ? 2 : 1;
   const auto bits = static_cast<std::uint64_t>(8 * bytes_of(v.type));
   page.tags = {{kWidth, {4, {static_cast<std::uint64_t>(v.size[0])}}},
@@ -372,25 +369,25 @@ Tiff tiff_file(Draw& draw) {
 }
 
 /// A page that is no slice: a reduced copy or a mask, of the size of the slices or smaller.
-TiffPage other_page(Tiff& f, std::uint64_t kind) {
+TaggedPage other_page(Tiff& f, std::uint64_t kind) {
   Numbered small = f.out.truth;
   small.size[2] = 1;
   if (f.draw.coin())
     small.size = {std::max(1, small.size[0] / 2), std::max(1, small.size[1] / 2), 1};
   number_anew(f.draw, small, small.type);
-  TiffPage page = tiff_page(small, 0, small.size[1]);
+  TaggedPage page = tiff_page(small, 0, small.size[1]);
   page.tags[kSubfile] = {4, {kind}};
   return page;
 }
 
-void insert_page(Tiff& f, TiffPage page) {
+void insert_page(Tiff& f, TaggedPage page) {
   const int at = f.draw.below(static_cast<int>(f.pages.size()) + 1);
   f.pages.insert(f.pages.begin() + at, std::move(page));
 }
 
 /// A slice of grey bits that are packed in bytes, or a colour, in place of each page.
 void set_tag(Tiff& f, int tag, std::uint64_t value) {
-  for (TiffPage& page : f.pages) page.tags[tag] = {3, {value}};
+  for (TaggedPage& page : f.pages) page.tags[tag] = {3, {value}};
 }
 
 struct TiffRow {
@@ -406,14 +403,14 @@ constexpr TiffRow kTiffRows[] = {
     {"packed by deflate", kRead, "",
      [](Tiff& f) {
        set_tag(f, kPacking, f.draw.of<std::uint64_t>({8, 32946}));
-       for (TiffPage& page : f.pages) {
+       for (TaggedPage& page : f.pages) {
          for (std::string& strip : page.strips) strip = zlib_packed(strip);
        }
      }},
     {"packed by PackBits", kRead, "",
      [](Tiff& f) {
        set_tag(f, kPacking, 32773);
-       for (TiffPage& page : f.pages) {
+       for (TaggedPage& page : f.pages) {
          for (std::string& strip : page.strips) {
            std::string packed;
            const std::size_t row =
@@ -475,7 +472,7 @@ constexpr TiffRow kTiffRows[] = {
        if (!palette) v.size[0] *= 3;
        number_anew(f.draw, v, VoxelType::uint8);
        renew_pages(f);
-       for (TiffPage& page : f.pages) {
+       for (TaggedPage& page : f.pages) {
          page.tags[kPhotometric] = {3, {palette ? 3U : 2U}};
          if (palette) page.tags[320] = {3, std::vector<std::uint64_t>(768, 99)};
          if (palette) continue;

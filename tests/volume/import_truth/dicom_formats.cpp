@@ -13,9 +13,6 @@ namespace kerf::test {
 namespace {
 using vec3::Vec, vec3::cross, vec3::dot, vec3::operator*, vec3::operator+;
 
-constexpr auto kRead = Expected::read, kRefused = Expected::refused, kAsked = Expected::asked,
-               kEither = Expected::read_or_refused;
-
 struct DataSet;
 struct Element {
   std::string vr, value;       ///< numbers little-endian

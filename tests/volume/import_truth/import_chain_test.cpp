@@ -22,7 +22,8 @@
 #include "visualizer/scene/cross_sections.hpp"
 #include "visualizer/scene/scene_view.hpp"
 
-using namespace kerf;
+namespace kerf::import_chain_test {
+
 using namespace kerf::test;
 using vec3::length, vec3::operator-, vec3::operator+, vec3::operator*;
 
@@ -205,3 +206,5 @@ TEST_CASE("a numbered volume lies in the segment, the window and OpenIGTLink as 
     CHECK(whole > 0);
   }
 }
+
+}  // namespace kerf::import_chain_test

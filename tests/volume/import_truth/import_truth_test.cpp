@@ -14,7 +14,8 @@
 #include "tests/volume/import_truth/check.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::import_truth_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -155,3 +156,5 @@ TEST_CASE("values and positions stay through window, file, crop and refinement")
     check(resample(image, {s[0] / 3, s[1] / 3, s[2] / 3}), 3, all);
   }
 }
+
+}  // namespace kerf::import_truth_test

@@ -100,6 +100,8 @@ enum class Expected : std::uint8_t {
   asked,            ///< one line that asks for --spacing or --series
   read_or_refused,  ///< not wrong in silence; the page has which of both
 };
+inline constexpr auto kRead = Expected::read, kRefused = Expected::refused,
+                      kAsked = Expected::asked, kEither = Expected::read_or_refused;
 
 /// A case on disk.
 struct Written {

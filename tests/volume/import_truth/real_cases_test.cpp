@@ -8,7 +8,8 @@
 #include "tests/volume/import_truth/check.hpp"
 #include "tests/volume/volume_files.hpp"
 
-using namespace kerf;
+namespace kerf::real_cases_test {
+
 using namespace kerf::test;
 
 namespace {
@@ -127,3 +128,5 @@ TEST_CASE("the import cases of one cylinder have the same HU, whatever tags they
   }
   CHECK(dense == 0);
 }
+
+}  // namespace kerf::real_cases_test

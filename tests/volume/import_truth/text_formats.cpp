@@ -132,8 +132,6 @@ struct Row {
   const char* word;
   void (*change)(TextFile&);
 };
-constexpr auto kRead = Expected::read, kRefused = Expected::refused, kAsked = Expected::asked,
-               kEither = Expected::read_or_refused;
 
 void spaced(TextFile& f) {
   f.volume().lay_flat();
