@@ -33,7 +33,7 @@ HandScript with_unit(HandScript script, const LoadedScene& scene) {
 std::unique_ptr<DeviceModel> model_for(const LoadedScene& scene, const HandScript& script) {
   PlantValues identified;
   if (scene.identified) {
-    identified = plant_of(*scene.identified, scene.servo.rate_hz, scene.device.identified);
+    identified = plant_of(*scene.identified, 1.0 / scene.servo.rate_hz, scene.device.identified);
   }
   return with_device_params(scene.device.personality, [&](auto params) {
     take_plant(script.plant, params);

@@ -219,7 +219,10 @@ def record(binaries, options, seconds=SECONDS):
         raise Refused(f"--scene {options.scene}: no device.torque_scale, so the motors stay off; add it (docs/devices.md)")
     explain(say, told, options, seconds)
     if options.port and sys.stdin.isatty() and sys.stdout.isatty():
-        input("kerf: identify: press Enter to begin ")
+        try:
+            input("kerf: identify: press Enter to begin ")
+        except EOFError:
+            raise Stopped("stopped before it began: nothing moved") from None
     folder = tempfile.mkdtemp(prefix="kerf-identify.")
     name = f"identify-{os.getpid()}"
     programs, interrupt = Programs(binaries, folder), Interrupt()

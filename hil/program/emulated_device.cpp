@@ -40,12 +40,13 @@ FaultScript faults_of(const EmulatorOptions& o) {
   return script;
 }
 
-/// In lock-step the period is known; else that of the recording is taken.
+/// In lock-step a command acts a period after its report; in real time the device moves on when it
+/// has looked for one, so that it acts at once.
 PlantValues identified_of(const EmulatorOptions& o) {
   if (o.identified.empty()) return {};
   try {
-    const IdentifiedDevice found = read_identified_device(o.identified);
-    return plant_of(found, o.lockstep ? o.rate_hz : found.rate_hz, o.identified);
+    return plant_of(read_identified_device(o.identified), o.lockstep ? 1.0 / o.rate_hz : 0,
+                    o.identified);
   } catch (const DeviceFileError& error) {
     throw HilError(error.what());
   }

@@ -14,7 +14,7 @@
 
 namespace kerf {
 
-PlantValues plant_of(const IdentifiedDevice& device, double rate_hz, const std::string& file) {
+PlantValues plant_of(const IdentifiedDevice& device, double own_delay_s, const std::string& file) {
   PlantValues values;
   const auto set = [&](std::string_view key, const char* found, const char* unit, double value) {
     const auto* const row = std::ranges::find_if(
@@ -38,8 +38,8 @@ PlantValues plant_of(const IdentifiedDevice& device, double rate_hz, const std::
   set("tip_mass_kg", "mass_kg", " kg", 3 / mobility);
   set("viscous_ns_per_mm", "viscous_ns_per_mm", " N s/mm", mean(device.viscous_ns_per_mm));
   set("coulomb_n", "coulomb_n", " N", mean(device.coulomb_n));
-  const double beyond_s = std::max(0.0, device.delay_s - 1 / rate_hz);
-  set("output_delay_cycles", "delay_s", " bus cycles of 125 us after a period",
+  const double beyond_s = std::max(0.0, device.delay_s - own_delay_s);
+  set("output_delay_cycles", "delay_s", " bus cycles of 125 us",
       std::round(beyond_s * kCyclesPerSecond));
   return values;
 }

@@ -336,7 +336,7 @@ TEST_CASE("a fault has been met when it changed something, not when its time has
 TEST_CASE("an identified device is emulated with its mean mass and friction, and its delay") {
   const auto device = kerf::parse_identified_device(kerf::test::kDeviceFile, "device.toml");
   kerf::PlantParams params;
-  take_plant(plant_of(device, 1000, "device.toml"), params);
+  take_plant(plant_of(device, 0.001, "device.toml"), params);
   // 3 / tr M^-1 by the eigenvalues' symmetric functions: e2 / det.
   const auto& m = device.mass_kg;
   const double e2 = m[0][0] * m[1][1] + m[0][0] * m[2][2] + m[1][1] * m[2][2] - m[0][1] * m[0][1] -
@@ -348,18 +348,18 @@ TEST_CASE("an identified device is emulated with its mean mass and friction, and
   CHECK(params.viscous_ns_per_mm == doctest::Approx(0.0005));
   CHECK(params.coulomb_n == doctest::Approx(0.2));
   CHECK(params.output_delay_cycles == 6);  // 0.8 ms after the period
-  take_plant(plant_of(device, 8000, "device.toml"), params);
+  take_plant(plant_of(device, 1.0 / 8000, "device.toml"), params);
   CHECK(params.output_delay_cycles == 13);  // 1.675 ms
-  take_plant(plant_of(device, 500, "device.toml"), params);
+  take_plant(plant_of(device, 0.002, "device.toml"), params);
   CHECK(params.output_delay_cycles == 0);
 
   const auto refusal = [](const std::string& from, const std::string& to) {
     const auto odd =
         kerf::parse_identified_device(kerf::test::device_file_with(from, to), "d.toml");
-    return kerf::test::error_of([&] { static_cast<void>(plant_of(odd, 1000, "d.toml")); });
+    return kerf::test::error_of([&] { static_cast<void>(plant_of(odd, 0.001, "d.toml")); });
   };
   CHECK(refusal("= 0.0018", "= 0.02") ==
-        "d.toml: device.delay_s: 152 bus cycles of 125 us after a period are out of range for an "
+        "d.toml: device.delay_s: 152 bus cycles of 125 us are out of range for an "
         "emulated device; use 0 to 64");
   CHECK(kerf::test::has(refusal("0.0004, 0.0005", "0.4, 0.5"), "device.viscous_ns_per_mm: "));
 }

@@ -42,7 +42,7 @@ def main():
     count = len(arms)
     found = identify_all(emulated.library(sys.argv[2]), arms)
     inside, relative, modes, missed_modes, bounds = [], [], [], 0, []
-    print(" n   mass g      f N    b/m  delay  q um  mode |  mass%  b%    f%   delay  mode% | inside bound% unexplained white spoilt")
+    print(" n   mass g      f N    b/m  delay  q um  mode |  mass%  b%    f%   delay  mode% | inside bound% unexplained white spoilt slips")
     for n, (arm, e) in enumerate(zip(arms, found)):
         t = truth_of(arm)
         true_mode = arm["mode"] / 2 / np.pi
@@ -72,7 +72,7 @@ def main():
             k = boundary.of_axes(e.mass_kg, e.values[6:9], max(e.values[18], 0), 0.001, damping)
         bounds.append(k / true_k - 1)
         print(head, f"{100 * off[:6].max():6.2f} {100 * off[6:9].max():6.1f} {100 * off[9:12].max():5.1f} {off[18]:6.3f} {found_mode:6.1f} | "
-              f"{within.sum():2}/19 {100 * bounds[-1]:6.1f} {100 * e.unexplained:6.2f}% {np.min(e.whiteness):.3f} {len(e.spoilt)}",
+              f"{within.sum():2}/19 {100 * bounds[-1]:6.1f} {100 * e.unexplained:6.2f}% {np.min(e.whiteness):.3f} {len(e.spoilt)} {len(e.slips)}",
               "not in: " + " ".join(estimate.NAMES[m].replace("coulomb", "f").replace("viscous", "b").replace("mass_", "m") for m in np.flatnonzero(~within)))
     inside, relative, bounds = np.array(inside), np.array(relative), np.array(bounds)
     print(f"{len(inside)} of {count} identified")

@@ -65,15 +65,21 @@ class TestGuided(unittest.TestCase):
         self.assertEqual(log.check(), [])
         return log
 
-    def test_an_emulated_omega_is_found_by_its_motion(self):
-        options = types.SimpleNamespace(scene=SCENE, device="omega", port=None, log=str(self.home / "log"))
+    def test_a_device_that_was_identified_is_emulated_and_found_again(self):
+        (self.home / "device.toml").write_text("[device]\nmass_kg = [0.12, 0.12, 0.12, 0, 0, 0]\nviscous_ns_per_mm = [0.0008, 0.0008, 0.0008]\n"
+                                               "coulomb_n = [0.15, 0.15, 0.15]\nquantum_mm = [0.01, 0.01, 0.01]\ndelay_s = 0.0015\n")
+        scene = self.home / "scene.toml"
+        scene.write_text(pathlib.Path(SCENE).read_text().replace("[hand]\nscript = \"hands/touch.toml\"", "")
+                         + "\n[device]\npersonality = \"omega\"\nidentified = \"device.toml\"\n")
+        options = types.SimpleNamespace(scene=str(scene), device=None, port=None, log=str(self.home / "log"))
         guided.record(BIN, options, SHORT_S)
         motion, lines = log_motion.read(options.log)
         self.assertEqual([line for line in lines if "fault" in line], [])
         found = estimate.estimate(motion)
         self.assertEqual(found.moved, ["x", "y", "z"])
-        self.assertLess(np.abs(found.values[:3] / 0.2 - 1).max(), 0.03)
-        self.assertLess(np.abs(found.values[9:12] / 0.1 - 1).max(), 0.1)
+        self.assertLess(np.abs(found.values[:3] / 0.12 - 1).max(), 0.05)
+        self.assertLess(np.abs(found.values[9:12] / 0.15 - 1).max(), 0.1)
+        self.assertTrue(1.3 < found.values[18] < 3, found.values[18])  # later on a busy machine
 
     def test_ctrl_c_keeps_what_was_recorded(self):
         process, said = self.begin()
