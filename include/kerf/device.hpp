@@ -18,7 +18,7 @@ struct DeviceState {
   std::uint64_t answers = 0;                  ///< number of the newest force that came before it
   std::array<double, 3> position_mm{};        ///< tip in the scene; NaN until calibrated
   std::array<double, 4> orientation{};        ///< quaternion x, y, z, w; NaN until calibrated
-  std::array<double, 3> velocity_mm_per_s{};  ///< NaN until the device is first in hand
+  std::array<double, 3> velocity_mm_per_s{};  ///< at the device port; NaN until first in hand
   std::array<double, 3> force_n{};            ///< sent, after all limits
   Phase phase = Phase::off;
   Fault fault = Fault::none;
@@ -56,16 +56,16 @@ class Device {
   /// mm of the scene for each mm of the device.
   [[nodiscard]] double workspace_scale() const noexcept;
 
-  /// Waits for a tick that `state` does not have, and takes it, of all arms. Returns false if the
-  /// controller has ended; `state` keeps its last tick. It asks four times a period, for as long as
-  /// the controller lives.
+  /// Waits for a new tick and copies it into `state`, for every arm. Returns false if the
+  /// controller has ended; `state` keeps its last tick. Reads the page four times a period, as long
+  /// as the controller lives.
   bool wait() noexcept;
-  /// Does not wait: takes the newest tick if `state` does not have it yet, and returns
-  /// whether it did.
+  /// Copies the newest tick into `state`, and returns whether it is a new one. Does not wait,
+  /// unless the controller was stopped while it wrote the page (kerf/external.h).
   bool poll() noexcept;
   /// False once `wait` or `poll` has found that the controller has ended.
   [[nodiscard]] bool alive() const noexcept;
-  /// The tick that was taken last, at first the newest of `open`; zeros for an arm that the
+  /// The tick that was copied last, at first the newest of `open`; zeros for an arm that the
   /// controller lacks.
   [[nodiscard]] const DeviceState& state(std::size_t arm = 0) const noexcept;
 

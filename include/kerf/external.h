@@ -15,8 +15,10 @@
  *     }
  *     kerf_external_close(&arm);
  *
- * Neither side ever waits for the other one. One program at a time, with at most one thread for
- * each arm; a program that it has forked since shares its place.
+ * The controller never waits for the program. The program's reads repeat while the controller
+ * writes: for some nanoseconds, or, if it is stopped just there, until it goes on or ends. One
+ * program at a time, with at most one thread for each arm; a program that it has forked since
+ * shares its place.
  */
 #ifndef KERF_EXTERNAL_H
 #define KERF_EXTERNAL_H
@@ -217,7 +219,7 @@ static inline void kerf_external_close(kerf_external* external) {
 /* The newest tick of an arm, 0 or 1; tick 0, in the phase off, before the first one. Returns 0, and
  * does not change `out`, if the controller has ended, and for an arm that it lacks. Of a controller
  * that was killed the last tick can be read once more. It makes no system call, unless the tick is
- * the one that was read last. */
+ * the one that was read last, or the controller is stopped while it writes. */
 static inline int kerf_external_read(kerf_external* external, unsigned arm, kerf_report* out) {
   kerf_external_arm* part;
   unsigned tries;

@@ -17,8 +17,9 @@ namespace kerf {
 ///     kerf::Hand hand(scene, "touch.toml");
 ///     servo.step(hand.next(servo.last()));
 ///
-/// The hand rests until the device is calibrated, reaches for the start of its script, goes through
-/// it and stays at its end (docs/script-keys.md). One thread.
+/// The hand rests until the device is calibrated, for 0.1 s (Falcon: 0.65 s), reaches for the start
+/// of its script, goes through it and stays at its end (docs/script-keys.md). No force comes before
+/// the phase `ramping`: step for some seconds, or until `ended`. One thread.
 class Hand {
  public:
   /// With the scene's own [[hand]]; if that names no script, the hand reaches for its start and is
@@ -45,7 +46,7 @@ class Hand {
   /// the script, and if a number is not finite.
   void lead(const std::array<double, 3>& tip_mm, bool button = false) noexcept;
 
-  /// True if it can be led: the script has ended.
+  /// True if it can be led: the script has ended. One that repeats never ends.
   [[nodiscard]] bool ended() const noexcept;
   /// The true tip in scene mm, which no encoder knows to the last digit.
   [[nodiscard]] std::array<double, 3> tip_mm() const noexcept;

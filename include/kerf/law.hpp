@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A force law, a velocity estimator or a stabiliser of your own in the servo of all of kerf's
-// programs: a class template over the loop's numbers, fixed point or double. docs/own-law.md leads
-// through it.
+// Your force law, velocity estimator or stabiliser: a class template over the loop's numbers, fixed
+// point or double. Only programs that link it know it: `kerf_programs` in CMake makes controller,
+// lab and replay with it. Elsewhere link its object files; the linker drops a registration from a
+// static library. docs/own-law.md leads through it.
 //
 //     template <class N>
 //     class Cubic {
@@ -14,8 +15,8 @@
 //           {{"stiffness_n_per_mm3", "N/mm^3", 0, 10, 0.1, "K"}}};
 //       struct State {};
 //       explicit Cubic(const kerf::LawSetup& setup) : k_(setup["stiffness_n_per_mm3"]) {}
-//       kerf::DeviceVec<typename N::Real> step(const kerf::ForceInput<N>& in, State&) const
-//       noexcept {
+//       kerf::DeviceVec<typename N::Real> step(const kerf::ForceInput<N>& in,
+//                                              State&) const noexcept {
 //         return in.spring_mm * (k_ * dot(in.spring_mm, in.spring_mm));
 //       }
 //      private:

@@ -61,13 +61,13 @@ struct ReplayOutcome {
   std::uint64_t ticks = 0;                     ///< that were stepped
   std::uint64_t output_hash = 0;               ///< of the first arm, after them
   std::optional<ReplayDifference> difference;  ///< none: each tick is equal to the last bit
-  /// Why the recording ends before its run did; empty if it does not. A replay without settings
-  /// stops at its first difference, which is no cut.
+  /// Why the recording ends before its run did; empty if it does not, or if the replay stopped at a
+  /// difference before that.
   std::string cut_short;
 };
 
-/// A recording. Of a run that goes on it has what was in the files when it was opened; a writer
-/// writes some ticks at a time.
+/// A recording. If its run goes on, it has the ticks that were in the files when it was opened; a
+/// recorder writes some ticks at a time.
 ///
 ///     auto log = kerf::Log::open("run");
 ///     for (const std::string& problem : log.check()) std::puts(problem.c_str());

@@ -16,10 +16,10 @@
 // Where to begin reading kerf's own code: docs/architecture.md is the map. A scene is the text of a
 // file; controller/scene checks it key by key, controller/load adds its volumes and tools, and
 // controller/plan makes plan and memory of the servo of it. `servo_step` in controller/servo is one
-// tick: sense, contact_force, limits, motor_command, cut. controller/kernel has the physics of a
-// tick as templates over the numbers. controller/loop runs the step against a clock and a device,
-// record/ and replay/ write its ticks down and repeat them, hil/ is the device and the hand that
-// stand in for real ones, lab/ measures. face/ puts these headers before all of it.
+// tick: sense, wanted_force, force_to_send, motor_command, cut, follow_cuts. controller/kernel has
+// the physics of a tick as templates over the numbers. controller/loop runs the step against a
+// clock and a device, record/ and replay/ write its ticks down and repeat them, hil/ is the device
+// and the hand that stand in for real ones, lab/ measures. face/ has the code of these headers.
 
 namespace kerf {
 

@@ -49,7 +49,8 @@ class Segment {
   /// Ticks that were published so far. The last 4096 can be read.
   [[nodiscard]] std::uint64_t count() const noexcept;
   /// Appends the records from number `from`, counted from 0, up to `count()` to `out`, oldest
-  /// first. Returns how many of them were overwritten before they were read.
+  /// first. Returns how many of them were overwritten before they were read. The next `from` is
+  /// this one plus the number of records appended plus the number returned.
   std::uint64_t since(std::uint64_t from, std::vector<TickRecord>& out, std::size_t arm = 0) const;
 
   /// Copies what has changed in a volume since the last call, into memory of this object. Returns
@@ -57,9 +58,11 @@ class Segment {
   VoxelView volume(std::size_t number, std::size_t* changed_bricks = nullptr);
 
   /// Asks the controller for a command, as a key in the window does; waits up to 2 s for its
-  /// answer. Returns the number that `last_command` has from the tick on that applied it, or 0:
-  /// refused, or a kind that a reader cannot ask for (`missed`, `fade_in`). What the servo itself
-  /// refuses, as an undo of nothing, has a number, too. Throws Error if there is no answer.
+  /// answer. Returns the command's number: the servo gets it before the step of the tick in which
+  /// `last_command` reaches that number, and may still refuse it, as an undo of nothing. Returns 0
+  /// if the queue of 64 commands is full (try again), or the command is refused: its argument is
+  /// out of range, or its kind is not a reader's (`missed`, `fade_in`). Throws Error if there is no
+  /// answer.
   std::uint32_t send(const ServoCommand& command);
 
  private:

@@ -13,8 +13,8 @@
 
 namespace kerf {
 
-/// A volume as it is now; x fastest. Lives as long as the object that it is of, and changes with
-/// its next step, or its next call for a volume.
+/// A volume as it is now; x fastest. Its densities lie in the Servo or Segment that returned it,
+/// and change with the next step or `restore`, or with the next `Segment::volume`.
 struct VoxelView {
   std::array<int, 3> size{};
   std::array<double, 3> spacing_mm{};
@@ -45,13 +45,14 @@ class Servo {
   /// 1 or 2.
   [[nodiscard]] std::size_t arms() const noexcept;
 
-  /// One tick of a scene with one arm. Of a scene with two the second one has no report then.
+  /// One tick of a scene with one arm. Of a scene with two the second one has no report then. The
+  /// records of `step` and `last` lie in this object: the next step overwrites them.
   const TickRecord& step(const DeviceReport& report) noexcept;
   /// One tick of all arms; a report that is missing counts as not fresh, those beyond the arms are
   /// ignored.
   std::span<const TickRecord> step(std::span<const DeviceReport> reports) noexcept;
-  /// The last tick of an arm, for a higher number that of the second; all zero before the first
-  /// one, with the phase `off`.
+  /// The last tick of an arm; all zero, so in the phase `off`, before the first one and for an arm
+  /// that the scene does not have. Numbers above 1 count as 1.
   [[nodiscard]] const TickRecord& last(std::size_t arm = 0) const noexcept;
 
   /// Call it before a step: first at most one command of a person, then at most one `missed`, then
@@ -69,7 +70,8 @@ class Servo {
 
   /// Volume number `volume` of the scene.
   [[nodiscard]] VoxelView voxels(std::size_t volume) const noexcept;
-  /// Hash of all volumes as they are now: `volume_hash` of reports and replays.
+  /// Hash of the contents of all volumes now: `volume_hash` of reports and replays. That of a
+  /// `TickRecord` is another one, a chain over the changes.
   [[nodiscard]] std::uint64_t volume_hash() const noexcept;
 
   /// All that the servo carries from tick to tick, with commands that wait and the last ticks. A

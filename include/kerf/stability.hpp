@@ -18,8 +18,9 @@
 //
 //     kerf::SampledLoop loop = kerf::device_loop("falcon", 1000);
 //     const double linear = kerf::highest_stiffness(loop, 0.004);
-//     const auto map = kerf::stability_map("0.5:20:12", {{"device", "falcon"}, {"damping",
-//     "0,0.004"}}); std::printf("%g %g N/mm\n", linear, map.columns[1].first_swing_n_per_mm);
+//     const auto map = kerf::stability_map("0.5:20:12",
+//                                          {{"device", "falcon"}, {"damping", "0,0.004"}});
+//     std::printf("%g %g N/mm\n", linear, map.columns[1].first_swing_n_per_mm);
 
 namespace kerf {
 
@@ -148,8 +149,8 @@ struct WallRun {
   double push_n = 0.5;      ///< of the hand, above Coulomb friction
   double hit_mm_per_s = 0;  ///< at 0.1 mm before the wall
   double seconds = 60;      ///< to which a run that is still open is followed
-  std::uint64_t seed =
-      1;  ///< shifts the steps of the encoder against the wall; 0: an edge is on it
+  /// Shifts the steps of the encoder against the wall; 0: an edge is on it.
+  std::uint64_t seed = 1;
   std::string law = "coupling";    ///< or "linear", "two_sided", or the name of a law
   std::string estimator = "foaw";  ///< a velocity estimator of docs/theory.md 5.3
   bool fixed_point = true;         ///< the servo's numbers; else double

@@ -15,8 +15,8 @@ namespace kerf {
 
 using Tick = std::uint64_t;  ///< count of servo steps; 0 is the state before the first one
 
-/// Report of the device in this tick: raw counts, not angles. The only input of the servo step
-/// besides commands, and so the input of a replay.
+/// Report of the device in this tick: raw counts, not angles. With commands, and `ProgramForce` in
+/// an external scene, it is all that the servo step gets, and so all that a replay needs.
 ///
 /// It is of one kind: counts of joints and gimbal, or a pose, as a Cartesian device reports it
 /// (docs/devices.md).
@@ -88,7 +88,7 @@ enum class Phase : std::uint8_t {
 enum class Fault : std::uint32_t {
   none = 0,
   stale_input = 1,  ///< no report for 20 ms
-  not_finite = 2,   ///< no finite pose, or counts of none, for more than 2 ms
+  not_finite = 2,   ///< no finite pose from the counts for more than 2 ms, or no finite force
   overspeed = 3,    ///< tip faster than the limit
   // A law of the scene gave a value that is not finite:
   force_law = 4,
@@ -122,8 +122,8 @@ enum class Fault : std::uint32_t {
   return "unknown";
 }
 
-/// Input, contact and output of one arm in one servo tick. World mm for the tip; forces in N at the
-/// device port. Unit, meaning and validity of each field: docs/log.md.
+/// Input, contact and output of one arm in one servo tick. The tip is in the scene (mm); velocity
+/// and forces are at the device port. Unit, meaning and validity of each field: docs/log.md.
 struct TickRecord {
   std::uint64_t seq;  ///< of record i: 2 i + 1 while it is written, then 2 i + 2; set by the writer
   std::uint64_t tick;
@@ -135,28 +135,28 @@ struct TickRecord {
   std::int32_t encoder_counts[6];  ///< 0..2: joints, unwrapped since docking; 3..5: gimbal, mrad
   double position_mm[3];           ///< NaN in the phases off and calibrating
   float orientation[4];            ///< quaternion x, y, z, w: tool to world; NaN as the position
-  float velocity_mm_per_s[3];      ///< NaN as the position, and until the device is first in hand
-  float commanded_force_n[3];
-  float contact_force_n[3];
-  float modification_force_n[3];
-  float proxy_offset_mm[3];
+  float velocity_mm_per_s[3];      ///< at the device; NaN as the position, and until first in hand
+  float commanded_force_n[3];      ///< sent, after all limits
+  float contact_force_n[3];        ///< wanted by the contact or the program, before limits
+  float modification_force_n[3];   ///< wanted by the cutting, before limits
+  float proxy_offset_mm[3];        ///< from the tip to the proxy's tip, in the scene
   std::int16_t dac_counts[3];
   std::uint16_t phase;    ///< `Phase` of the servo
-  std::uint32_t removed;  ///< density units removed in this tick; in an undo, restored
+  std::uint32_t removed;  ///< in this tick, in 1/65535 of a voxel; in an undo, restored
   double port_energy_j;   ///< energy that the loop took from the hand since the start of the run
   double port_minimum_j;  ///< its lowest value so far; below 0 the loop gave more than it took
   float joint_torque_n_mm[3];
-  std::uint32_t refused_packets;  ///< since the start: none, old, or repeated under force
-  std::uint64_t volume_hash;      ///< chained over all changed boxes since the start
+  std::uint32_t refused_packets;  ///< since the start: no report, an old one, a repeat under force
+  std::uint64_t volume_hash;      ///< chain over all changes so far; not `Servo::volume_hash`
   std::uint64_t output_hash;      ///< chained over all outputs since the start
   std::uint16_t dirty_lo[3];      ///< first voxel of the changed box of the first changed volume
   std::uint16_t dirty_hi[3];      ///< its end, exclusive
   std::uint32_t lost_packets;     ///< since the start
   std::uint32_t dirty_volumes;    ///< bit v: volume v changed in this tick
-  std::uint32_t last_command;     ///< number of the newest of a reader that was applied; 0: none
+  std::uint32_t last_command;     ///< number of the newest one of a reader, applied or not; 0: none
   float tip_torque_n_mm[3];
   float spindle_ratio;
-  std::int32_t raw[11];  ///< as received from the device; kRaw...
+  std::int32_t raw[11];  ///< as received, the last report if this tick has none; kRaw...
   float press_n;         ///< normal force that cuts, in the scene
   // `port_energy_j` by source, in steps of 2^-32 mJ.
   std::int64_t energy_spring;
@@ -170,13 +170,13 @@ struct TickRecord {
   float spindle_load;
   std::uint32_t active_tool;
   std::uint32_t fault;
-  std::uint32_t stale;
+  std::uint32_t stale;  ///< 1: no fresh report
   float penetration_mm;
   std::uint32_t plane_count;       ///< contact planes that hold the tool, at most 3
   float plane_load_n[3];           ///< along each normal, before any limit, at the device port
   float plane_normal[9];           ///< x, y, z of each, out of the solid
   float plane_arm_mm[9];           ///< x, y, z of each: from the tool's centre to the contact
-  std::uint32_t command;           ///< applied before this tick's step; kCommand...
+  std::uint32_t command;           ///< given before the step, applied or refused; kCommand...
   std::uint32_t command_argument;  ///< of that command: index of the tool; hold: 1 on, 0 off
   std::uint32_t crc32c;            ///< of all bytes from `tick` up to here; set by the writer
 };
@@ -210,7 +210,7 @@ inline constexpr std::uint32_t kMostMissed = 0xffff;  ///< more count as these: 
 inline constexpr std::uint32_t kCommandMark = 7;      ///< a kind; only marks the tick in the log
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
-inline constexpr std::size_t kRawPot = 3;      ///< first of 6
+inline constexpr std::size_t kRawPot = 3;      ///< first of 6; of a pose: 4, the quaternion
 inline constexpr std::size_t kRawStatus = 9;   ///< bits: button 1, button 2, parked, not homed
 inline constexpr std::size_t kRawDeviceCounter = 10;
 
