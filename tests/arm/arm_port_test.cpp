@@ -46,8 +46,9 @@ TEST_CASE("arm port: without an adapter, with one that is not ready or has ended
   const RuntimeFolder folder;
   CHECK(error_of([] { open_arm("arm"); }) ==
         "--port arm:touch: no kerf-arm for touch; start ./kerf arm --device touch");
-  CHECK(error_of([] { open_arm("arm:left"); }) ==
-        "--port arm:left: no kerf-arm named left; start ./kerf arm --device touch --name left");
+  CHECK(error_of([] {
+          open_arm("arm:left");
+        }).starts_with("--port arm:left: no kerf-arm named left; "));
   ArmPageAdapter arm("touch", Personality::touch, 1000);
   arm.set_state(ArmState::starting, "the vendor's library opens the device");
   CHECK(error_of([] { open_arm("arm"); }) ==

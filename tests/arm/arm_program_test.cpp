@@ -189,7 +189,7 @@ TEST_CASE("arm: every bad library is one line and exit code 2") {
       {"omega", "type=60", {}, "device of type 60, Falcon: no omega"},
       {"omega", "", {"--peak", "nan"}, "--peak"},
       {"omega", "", {"--peak", "13"}, "--peak"},
-      {"touch", "", {"--peak", "2"}, "--peak: of an omega; leave it out"},
+      {"touch", "", {"--peak", "2"}, "--peak: of an omega; "},
       {"touch", "init_error", {}, "cannot be opened (error 300"},
       {"touch", "garbage_handle", {}, "an invalid handle"},
       {"touch", "", {"--rate", "700"}, "--rate 700: not taken by the library (error 101"},

@@ -49,11 +49,9 @@ TEST_CASE("--service: that of this machine by itself, or another place") {
 TEST_CASE("the port of a service is kerf-arm's: --port arm, and what ws was is refused in a line") {
   CHECK(resolve_port("auto", Personality::inverse3) == "arm");
   for (const char* former : {"ws", "ws:5000,park=a"}) {
-    CHECK(error_of([&] { check_port(former); }) ==
-          "--port " + std::string(former) +
-              ": the Inverse3's service is kerf-arm's; take --port arm, which starts it, or for "
-              "another address, button or arm first ./kerf arm --device inverse3 --service "
-              "[HOST:]PORT");
+    CHECK(error_of([&] { check_port(former); })
+              .starts_with("--port " + std::string(former) +
+                           ": the Inverse3's service is kerf-arm's; take --port arm, "));
   }
 }
 

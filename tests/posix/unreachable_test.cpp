@@ -18,18 +18,16 @@ TEST_CASE("links in a circle are told as such, where a file is read and where on
   fs::create_symlink("there", folder / "here");
   fs::create_symlink("here", folder / "there");
   fs::create_symlink("nothing", folder / "dangling");
-  const std::string why =
-      ": cannot be reached (Too many levels of symbolic links); mend its links, which lead to "
-      "themselves";
-  CHECK(access_error(folder / "itself") == why);
-  CHECK(access_error(folder / "here/scene.toml") == why);
+  const std::string why = ": cannot be reached (Too many levels of symbolic links); ";
+  CHECK(access_error(folder / "itself").starts_with(why));
+  CHECK(access_error(folder / "here/scene.toml").starts_with(why));
   CHECK(access_error(folder.path()) == "");
   CHECK(access_error(folder / "nothing") == "");
   CHECK(access_error(folder / "nothing/below") == "");
   CHECK(access_error(folder / "dangling") == "");
   const fs::path report = folder / "here/report.json";
-  CHECK_THROWS_WITH_AS(kerf::check_new_file(report), (report.string() + why).c_str(),
-                       kerf::FileError);
+  CHECK_THROWS_WITH_AS(kerf::check_new_file(report),
+                       doctest::Contains((report.string() + why).c_str()), kerf::FileError);
 }
 
 }  // namespace kerf::unreachable_test

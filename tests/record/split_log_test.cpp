@@ -117,8 +117,9 @@ TEST_CASE("files of a log that are missing or of another one are named") {
   std::filesystem::remove(part_of_log(path, 2));
   CHECK(error_of([&] { const TickLogReader log(path); }) == line);
   std::ofstream(part_of_log(path, 2)) << std::string(5000, 'x');
-  CHECK(error_of([&] { const TickLogReader log(path); }) ==
-        part_of_log(path, 2).string() + ": not a tick log of this version; record it again");
+  CHECK(error_of([&] {
+          const TickLogReader log(path);
+        }).starts_with(part_of_log(path, 2).string() + ": not a tick log of this version; "));
   std::filesystem::remove(path);
   CHECK(error_of([&] { write_until(path, 1, kNew); }) ==
         part_of_log(path, 2).string() + ": of a recording; choose another --out");
@@ -159,8 +160,9 @@ TEST_CASE("a file that cannot be begun is named, and the rows before it stay") {
           while (log.rows() < kRows) log.append(row(log.rows()));
         }) == part_of_log(path, 2).string() +
                   ": cannot be written (Is a directory); make room or choose another --out");
-  CHECK(error_of([&] { const TickLogReader read(path); }) ==
-        part_of_log(path, 2).string() + ": no regular file; copy the recording again");
+  CHECK(error_of([&] {
+          const TickLogReader read(path);
+        }).starts_with(part_of_log(path, 2).string() + ": no regular file; "));
   std::filesystem::remove(part_of_log(path, 2));
   CHECK(rows_of_parts(path) == Counts{1000});
   CHECK(sound_rows(path) == 1000);

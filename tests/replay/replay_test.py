@@ -289,7 +289,7 @@ class TestReplay(unittest.TestCase):
         self.assertIn("each equal", replay(out))  # a replay is a recording like any other
         self.assertTrue(plot.read_text().startswith("<?xml"))
         self.assertEqual(json.loads(report.read_text())["ticks"], len(self.rows(self.log)[HEADER:]) // self.row)
-        self.assertIn("holds a recording; choose another --out", replay(self.log, "--out", out, code=2))
+        self.assertIn(f"{out}/ticks.npy: holds a recording; ", replay(self.log, "--out", out, code=2))
         self.assertIn("places of the tool", replay(self.log, "--numeric", "double"))
         self.assertIn("did you mean", replay(self.log, "--set", "force.stifness_n_per_mm=1", code=2))
         self.assertIn("places of the tool", replay(self.log, "--scene", ROOT / "scenes/touch.toml"))

@@ -176,7 +176,7 @@ TEST_CASE("a program with commands needs one, which has its own options and the 
   };
   CHECK(run({"show", "a"}) == "show a");
   CHECK(run({"hide"}) == "hide");
-  CHECK(run({}) == "no command is given; see --help");
+  CHECK(run({}).starts_with("no command is given; "));
   CHECK(run({"shew"}) == "shew is not known; did you mean show? see --help");
   CHECK(run({"show"}) == "FILE is missing; see --help");
   CHECK(run({"--zzz", "a"}) == "--zzz is not known; see --help");

@@ -337,7 +337,7 @@ TEST_CASE("a NIfTI of other voxels or axes is refused by their name") {
     for (const int d : dim) bytes += i16(d);
     return refusal_of(file({{kDim, bytes}}));
   };
-  CHECK(has(sized({2, 3, 20, 1}), "2 axes; kerf needs a volume of three"));
+  CHECK(has(sized({2, 3, 20, 1}), "2 axes; "));
   CHECK(has(sized({0}), "0 axes"));
   CHECK(has(sized({-3}), "-3 axes"));
   CHECK(has(sized({3, -3, 4, 5}), "is empty"));

@@ -178,8 +178,8 @@ TEST_CASE("a stack that is not whole, or not one, is refused by the slice") {
     return message.substr(message.find_last_of('/') + 1);
   };
   const std::string whole = "no error";
-  CHECK(refused({"s1.png", "s2.png", "s3.png", "s5.png"}) ==
-        "s5.png: follows s3.png, s4.png is missing; add it, or number the slices in even steps");
+  CHECK(refused({"s1.png", "s2.png", "s3.png", "s5.png"})
+            .starts_with("s5.png: follows s3.png, s4.png is missing; "));
   CHECK(refused({"s008.tif", "s009.tif", "s011.tif"})
             .starts_with("s011.tif: follows s009.tif, s010.tif is missing"));
   CHECK(refused({"s1.png", "s2.png", "s4.png", "s6.png", "s8.png"})

@@ -194,8 +194,8 @@ TEST_CASE("a file that is there is replaced where that is asked for, and else st
       const Outcome result = run(arguments);
       CHECK(result.code == 2);
       CHECK(result.out.empty());
-      CHECK(result.err == "kerf-volume: " + (folder / place).string() +
-                              ": is there already; take another name, or --force to replace it\n");
+      CHECK(result.err.starts_with("kerf-volume: " + (folder / place).string() +
+                                   ": is there already; "));
     };
     folder.write("there.nrrd", "mine");
     refused("there.nrrd", "there.nrrd");

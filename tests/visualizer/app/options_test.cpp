@@ -47,10 +47,10 @@ TEST_CASE("full screen and a monitor are a window's") {
   CHECK_FALSE(parse({})->size_is_given);
   CHECK(parse({"--size", "640x480"})->size_is_given);
   CHECK_THROWS_WITH_AS(parse({"--full-screen", "--headless"}),
-                       "--full-screen: --headless has no window; give one of the two",
+                       doctest::Contains("--full-screen: --headless has no window; "),
                        VisualizerError);
   CHECK_THROWS_WITH_AS(parse({"--monitor", "2", "--bench"}),
-                       "--monitor: --bench has no window; give one of the two", VisualizerError);
+                       doctest::Contains("--monitor: --bench has no window; "), VisualizerError);
 }
 
 TEST_CASE("a size that is none is refused with the limits") {

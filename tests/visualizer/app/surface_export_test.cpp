@@ -194,8 +194,7 @@ TEST_CASE("an export that cannot work is refused in one line, and leaves no file
     const fs::path file = folder / name;
     CHECK_THROWS_WITH_AS(
         check_export(file),
-        ("--export: " + file.string() + ": the name says no format; let it end in .stl or .ply")
-            .c_str(),
+        doctest::Contains(("--export: " + file.string() + ": the name says no format; ").c_str()),
         VisualizerError);
     CHECK_THROWS_AS(export_surface(file, scene.view, scene.contents()), VisualizerError);
   }
