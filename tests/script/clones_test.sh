@@ -23,28 +23,25 @@ mkdir -p "$first/.ci" "$first/cmake"
 cp -r "$root/kerf" "$root/cli" "$root/CMakePresets.json" "$first"
 cp "$root/.ci/stages.sh" "$first/.ci"
 printf '#!/bin/sh\n' >"$first/.ci/packages.sh"
-cp "$root/tests/join_files.sh" "$first/.ci"
 chmod +x "$first/.ci/packages.sh"
 touch "$first/cmake/wasm32-wasi.cmake"
-# Like kerf: a compiled path, a joined file that includes by absolute paths, a generated file, the page of a browser.
+# Like kerf: a compiled path, a unit that includes its files by absolute paths, the page of a browser.
 cat >"$first/CMakeLists.txt" <<'PROJECT'
 cmake_minimum_required(VERSION 3.25)
 project(kerf VERSION 0.1.0 LANGUAGES CXX)
 option(KERF_WEB "" OFF)
 set(KERF_WORD "none" CACHE STRING "")
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
-set(joined ${CMAKE_BINARY_DIR}/joined.cpp)
-add_custom_command(OUTPUT ${joined} COMMAND .ci/join_files.sh ${PROJECT_SOURCE_DIR}/word.cpp > ${joined}
-  WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} DEPENDS word.cpp VERBATIM)
-add_executable(kerf-controller main.cpp ${joined})
+set(CMAKE_UNITY_BUILD ON)
+add_executable(kerf-controller main.cpp word.cpp)
 target_compile_definitions(kerf-controller PRIVATE ROOT="${PROJECT_SOURCE_DIR}" WORD="${KERF_WORD}")
 add_custom_target(kerf-page COMMAND cmake -E make_directory page
   COMMAND cmake -E copy ${PROJECT_SOURCE_DIR}/word.cpp page/word.txt WORKING_DIRECTORY ${CMAKE_BINARY_DIR})
 PROJECT
 cat >"$first/main.cpp" <<'MAIN'
 #include <cstdio>
-namespace file_1 { const char* word(); }
-int main() { std::printf("%s %s %s\n", file_1::word(), WORD, ROOT); }
+const char* word();
+int main() { std::printf("%s %s %s\n", word(), WORD, ROOT); }
 MAIN
 echo 'const char* word() { return "one"; }' >"$first/word.cpp"
 
