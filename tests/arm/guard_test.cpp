@@ -10,6 +10,7 @@
 
 #include <doctest/doctest.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -74,6 +75,32 @@ TEST_CASE("guard: every end of a guarded child has one line, or its own exit cod
   const End killed = guarded([]() -> int { return raise(SIGKILL); });
   CHECK(killed.code == 2);
   CHECK(killed.said.starts_with("guard: killed, so the device was not closed"));
+}
+
+TEST_CASE(
+    "guard: the newest last word leaves once the child is killed, and none that was taken back") {
+  std::array<int, 2> ends{};
+  REQUIRE(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()) == 0);
+  const auto heard = [&] {
+    std::array<char, 64> bytes{};
+    const ssize_t size = recv(ends[1], bytes.data(), bytes.size(), 0);
+    return std::string(bytes.data(), size > 0 ? static_cast<std::size_t>(size) : 0);
+  };
+  const End killed = guarded([&]() -> int {
+    kerf::leave_last_word(ends[0], "an older one");
+    kerf::leave_last_word(ends[0], "zero force");
+    return raise(SIGKILL);
+  });
+  CHECK(killed.said.starts_with("guard: killed; the device's service was given zero force"));
+  CHECK(heard() == "zero force");
+  const End without = guarded([&]() -> int {
+    kerf::leave_last_word(ends[0], "zero force");
+    kerf::leave_last_word(-1, "");
+    return raise(SIGKILL);
+  });
+  CHECK(without.said.starts_with("guard: killed, so the device was not closed"));
+  CHECK(heard().empty());
+  for (const int end : ends) close(end);
 }
 
 TEST_CASE("guard: signals are passed on, and a guard that is killed ends its child in order") {

@@ -222,6 +222,34 @@ TEST_CASE("a program that opens while controllers come and go finds a whole page
   CHECK(opened >= 200);
 }
 
+TEST_CASE("a force of a program that writes without a pause is whole") {
+  const Folder folder;
+  kerf::ExternalPage page("d", {});
+  std::atomic<bool> stop{false};
+  std::jthread program([&] {
+    auto device = kerf::Device::open("d");
+    for (double i = 1; !stop; ++i) {
+      device.give({.force_n = {i, i, i},
+                   .goal_mm = {i, i, i},
+                   .stiffness_n_per_mm = i,
+                   .damping_ns_per_mm = i});
+    }
+  });
+  int torn = 0;
+  for (int taken = 0; taken < 100'000;) {
+    kerf::ProgramForce force;
+    if (!page.take(0, force)) continue;
+    ++taken;
+    const double i = force.force_n[0];
+    const bool whole = force.force_n == std::array{i, i, i} &&
+                       force.goal_mm == std::array{i, i, i} && force.stiffness_n_per_mm == i &&
+                       force.damping_ns_per_mm == i;
+    torn += whole ? 0 : 1;
+  }
+  stop = true;
+  CHECK(torn == 0);
+}
+
 TEST_CASE("neither side sees half of what the other one writes") {
   const Folder folder;
   kerf::ExternalPage page("d", {});
