@@ -39,6 +39,7 @@ void require_sound(const WallRun& run) {
   require_within("damping_ns_per_mm", run.damping_ns_per_mm, 0, 2);
   require_within("push_n", run.push_n, 0, 100);
   require_within("hit_mm_per_s", run.hit_mm_per_s, 0, 10'000);
+  require_within("start_mm", run.start_mm, 0, 10);
   require_within("seconds", run.seconds, 0.001, zwidth::kLongestLimitS);
 }
 
@@ -47,7 +48,6 @@ zwidth::LoopCase case_of(const WallRun& run) {
   zwidth::LoopCase subject;
   subject.loop = run.loop;
   subject.damping_ns_per_mm = run.damping_ns_per_mm;
-  subject.push_n = run.push_n;
   subject.estimator.name = run.estimator;
   subject.numeric = run.fixed_point ? NumericKind::fixed : NumericKind::float64;
   subject.limits = run.limits;
@@ -179,8 +179,9 @@ LimitCycle run_on_wall(const WallRun& run, const WallWatch& watch) {
     require_sound(run);
     zwidth::StepCounter ticks;
     try {
-      return zwidth::hit_one_axis(case_of(run), run.stiffness_n_per_mm, run.hit_mm_per_s,
-                                  run.seconds, run.seed, ticks, shown);
+      return zwidth::hit_one_axis(case_of(run), run.stiffness_n_per_mm,
+                                  {run.push_n, run.hit_mm_per_s, run.start_mm}, run.seconds,
+                                  run.seed, ticks, shown);
     } catch (const Interrupted&) {
       return LimitCycle{};
     } catch (const LawError& error) {

@@ -147,7 +147,8 @@ struct WallRun {
   double stiffness_n_per_mm = 1;
   double damping_ns_per_mm = 0;
   double push_n = 0.5;      ///< of the hand, above Coulomb friction
-  double hit_mm_per_s = 0;  ///< at 0.1 mm before the wall
+  double hit_mm_per_s = 0;  ///< at the start
+  double start_mm = 0.1;    ///< before the wall
   double seconds = 60;      ///< to which a run that is still open is followed
   /// Shifts the steps of the encoder against the wall; 0: an edge is on it.
   std::uint64_t seed = 1;
@@ -175,10 +176,10 @@ struct MapAxis {
 /// One combination of the axes' values, at all stiffnesses.
 struct MapColumn {
   std::vector<std::string> values;  ///< by axis as given
-  std::vector<LimitCycle> cells;  ///< by stiffness: the worst of hits at 0, 50, 200 mm/s and seeds
-  std::string impossible;         ///< why it has no cells; empty: it has
-  /// The lowest stiffness, within 0.5 %, at which a hit of any seed oscillates, or gives energy; 0:
-  /// the lowest of all does; infinite: none does.
+  std::vector<LimitCycle> cells;    ///< by stiffness: the worst of all presses and seeds
+  std::string impossible;           ///< why it has no cells; empty: it has
+  /// The lowest stiffness, within 0.5 %, at which a press of any seed oscillates, or gives energy;
+  /// 0: the lowest of all does; infinite: none does.
   double first_swing_n_per_mm = 0, first_energy_n_per_mm = 0;
   /// Lowest stiffness of each seed alone; one entry, if the loop's encoders have no steps that it
   /// shifts.

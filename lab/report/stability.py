@@ -30,9 +30,11 @@ The Z-width of a device is the range of stiffness K that it can render, from fre
 sampled wall adds a little energy in every tick; damping of device, wall and hand removes it. Above some K more is added
 than removed, and the tip oscillates.
 
-Each cell of a map is a device at a flat wall, without a hand unless stated. The runs of a cell start 0.1 mm before the
-wall, at rest, at 50 and at 200 mm/s, and push with the Coulomb friction plus 0.5 N. All are repeated for each seed, and
-a cell has the worst verdict of all.
+Each cell of a map is a device at a flat wall, without a hand unless stated, that a *press* meets: a push (above
+friction), a speed and a distance at which the tip starts. Each stiffness gets 0.5 N from 0.1 mm at 0, 50 and 200 mm/s,
+and two presses of a sequence that fills all pushes from 0.05 N to 0.9 of the peak force, speeds up to 500 mm/s and
+distances up to 2 mm evenly from one stiffness to the next. All are repeated for each seed, and a cell has the worst
+verdict of all. `--push`, `--hit` and `--start` set one of the three, or a list of it as an axis.
 
 * A cell *rests* if each run is proven to: friction holds the tip under a constant force for longer than the loop
   remembers; or in the last half of the run the travel is at most one encoder step, and the energy given at most that of
@@ -48,17 +50,23 @@ a cell has the worst verdict of all.
   swing with friction and encoder steps is chaotic: one run in a hundred stops only after 3 to 45 s. `--seconds` makes
   the limit longer, never shorter, so that no verdict depends on it.
 * *First* is the lowest K of a column at which a run of any seed swings or is active: searched upwards in steps of 1 %,
-  the whole arm in those of the map, then halved to 0.5 %. The picture has a bar from the lowest to the highest first
-  swing of a single seed. Stable cells above are reported apart, because a hand cannot reach them.
+  then down by presses beside the one that was bad, as long as one of them is bad 2 % lower, then halved to 0.5 %; of the
+  whole arm in the steps of the map, halved to 0.5 %. Cells above it are tried with that press, too. The picture has a
+  bar from the lowest to the highest first swing of a single seed. Stable cells above are reported apart, because a hand
+  cannot reach them.
+* With friction the worst push is about half of the peak: there an oscillation has the most room between no force and the
+  peak, and the larger it is, the less of it friction takes (docs/theory.md 5.7).
 * There is no thermal limit: weaker motors would end an oscillation.
 
-A seed sets the phase of the encoder steps relative to the wall, with friction worth up to a factor of two in K. It is
+A seed sets the phase of the encoder steps relative to the wall, which at one press is worth up to a factor of two in K,
+and where the sequence of presses begins. It is
 equal in every column, so that two columns differ by their axes alone. `--seed` is the first seed, `--seeds` their
 number, 5 unless given.
 
 *One axis* runs the servo's own coupling, velocity estimator, stabilisers and force limits, as the same templates and in
 the loop's numbers, with exact mechanics. *Whole arm* (`--arm`) runs the servo step with the emulated device, its driver
-and its packets in virtual time; it also slides onto the flat and hits the corner of three walls. The mechanics are
+and its packets in virtual time; it also slides onto the flat and hits the corner of three walls, and one press of the
+sequence is flat on. The mechanics are
 plausible values, not those of a unit: for your device, give `--mass`, `--viscous`, `--friction` and `--quantum`.
 
 """
@@ -71,8 +79,9 @@ device's map.
   without friction, encoder steps and limits. A picture draws it in black for that loop alone, dotted beside others.
 * The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
 * Each measured K is the lowest of five seeds; undecided counts as unstable. The whole arm has 14 stiffnesses.
-* *Recommended K* is the minimum of the row over 1.5. The margin covers phases, speeds and islands between two steps
-  that no run of the map met.
+* *Recommended K* is the minimum of the row over 1.5. The margin covers phases and islands between two steps that no run
+  of the map met. Of 10,000 random presses at each of them none oscillates or is active (`zwidth_maps`, the part `ranges`
+  of `.ci/all`); five in 180,000 are undecided: push and twice the friction are the peak there, so the tip creeps out.
 * The delay of a real device is not known; assume two periods until you measure it.
 * Take no more damping than the map shows as stable: beyond its maximum the lag of the velocity and the encoder steps
   drive the oscillation.
@@ -86,6 +95,7 @@ STABILISERS = """
 ## Stabilisers
 
 The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed.
+Their worst press is another one: a light push alone (`--push 0.5`) is helped far more than a hard one.
 docs/energy.md has the effect on the hand. `passivity` books a force in the tick that commands it. With a delay the force
 acts later, and the port may give far more energy than is booked: `port_minimum_mj` of `--csv` has the lowest energy of the
 port in each cell. A run that swings and is active ends its cell.
@@ -123,7 +133,7 @@ no rows.
 
 | column | unit | meaning |
 |---|---|---|
-| loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits | in the name | value of each axis, given or standard |
+| loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits, push_n, hit_mm_per_s, start_mm | in the name | value of each axis, given or standard; `any` of a press: searched |
 | stiffness_n_per_mm | N/mm | K of the cell |
 | swings, active, undecided, arithmetic | 0 or 1 | a run shows it; a cell with four zeros is proven to rest |
 | travel_mm | mm | peak to peak in the last half of a run, the largest of all runs; 0: held by friction |
@@ -140,9 +150,10 @@ no rows.
 | columns | a list, one for each combination of the other axes, of the following |
 | axes | value of each axis as a text, by the names of the CSV |
 | impossible | why the column has no cells; null: it has |
-| by_travel, by_energy | crossings by *swings* and *active*, each with the next three rows |
+| by_travel, by_energy | crossings by *swings* and *active*, each with the next four rows |
 | first_n_per_mm, reason | lowest K of all seeds; or null, and the reason: `below all`, `above all`, `undecided` (no cell is bad, one is undecided), `not measured` |
 | last_n_per_mm, last_reason | the same of the seed that crosses last |
+| by_seed_n_per_mm, band_n_per_mm | lowest K of each seed, and of the seed below which 5 and 95 % of them are: `--seeds 200`; null: none, or below all |
 | re_entry_from_n_per_mm, re_entry_to_n_per_mm | cells above the first crossing that rest again; null: none |
 | undecided_from_n_per_mm | lowest K at which a run is undecided; null: none |
 | analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop, 0: nothing is stable, null: for another loop; exact_holds, passive_holds: whether this column's loop is the one of the bound |
@@ -159,6 +170,8 @@ HOW = """\
     ./kerf lab zwidth --portraits portrait.svg --cells 1:0.002,10:0.002                  # position against speed; --arm too
     ./kerf lab zwidth --arm --delay 0 --stiffness 0.1:50:40 --plot arm.svg               # the whole servo step; minutes
     ./kerf lab zwidth --stabiliser none,passivity,energy_bounding --plot s.svg           # one panel for each
+    ./kerf lab zwidth --map push,stiffness --push 0.1:2.9:15 --damping 0.002 --plot p.svg # what is stable for a light push alone
+    ./kerf lab zwidth --seeds 200 --damping 0.002 --map delay,stiffness --delay 0,1,2 --json band.json # K of each seed
 
 `--law`, `--estimator` and `--stabiliser` also take the laws that a program of yours registers (docs/own-law.md).
 

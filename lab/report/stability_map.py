@@ -28,7 +28,8 @@ AXES = {
     "friction": ("friction_n", "N", "Coulomb friction of the device (N)"),
     "viscous": ("viscous_ns_per_mm", "N s/mm"), "mass": ("mass_kg", "kg"), "estimator": ("estimator", ""),
     "filter": ("filter_ms", "ms"), "hand": ("hand", ""), "mode": ("mode_hz", "Hz"), "numeric": ("numeric", ""),
-    "law": ("law", ""), "stabiliser": ("stabiliser", ""), "limits": ("limits", "")}
+    "law": ("law", ""), "stabiliser": ("stabiliser", ""), "limits": ("limits", ""),
+    "push": ("push_n", "N", "push of the hand, above friction (N)"), "hit": ("hit_mm_per_s", "mm/s"), "start": ("start_mm", "mm")}
 LOOPS = {"ideal": "the loop of the theory: linear, exact numbers", "kerf": "the loop of kerf: friction, encoder steps, its own force"}
 
 RESTS, ACTIVE, SWINGS, UNDECIDED, NONE = "#CFE8DC", "#F7E3A1", "#F0B79B", "#B8B4DC", "#D9D9D9"
@@ -108,7 +109,9 @@ def foot(data, axes, varies):
     parts += say("limits", "limits ", "", "on") if is_loop else []
     parts += say("mode", "mode ", " Hz", "0") if data["whole_arm"] else []
     parts += say("rate", "", " Hz") + say("delay", "delay ", " periods") + say("damping", "B ", " N s/mm") + say("hand", "hand ")
-    parts += ["whole arm" if data["whole_arm"] else "one axis", "hits: a push", "50 and 200 mm/s"]
+    parts += ["whole arm" if data["whole_arm"] else "one axis"]
+    given = say("push", "push ", " N", "any") + say("hit", "hit ", " mm/s", "any") + say("start", "start ", " mm", "any")
+    parts += given or ["any press"]
     parts += ["a slide", "a corner"] if data["whole_arm"] else []
     seed, seeds = data["seed"], data.get("seeds", 1)
     parts += [f"{data['seconds']:g} s each at most", f"seeds {seed} to {seed + seeds - 1}" if seeds > 1 else f"seed {seed}"]

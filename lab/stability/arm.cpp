@@ -65,15 +65,16 @@ std::unique_ptr<DeviceModel> model_of(const LoopCase& subject) {
 /// One way of meeting a wall; device mm, of the tool's middle. Judged along `normal`.
 struct ArmHit {
   DeviceVec<double> from, to;
-  double mm_per_s;  ///< 0: gently
+  double mm_per_s;  ///< slower than that: gently
   DeviceVec<double> normal{0, 1, 0};
   double wall_mm = kRadiusMm;  ///< of the tool's middle along `normal` at the first contact
 };
 
 /// At a place that the seed shifts.
-std::array<ArmHit, kArmHits> hits_of(const LoopCase& subject, std::uint64_t seed) {
+std::array<ArmHit, kArmHits> hits_of(const LoopCase& subject, const Press& press,
+                                     std::uint64_t seed) {
   const double depth_mm =
-      (subject.push_n + subject.loop.coulomb_n) / pushing_hand(subject).stiffness_n_per_mm;
+      (press.push_n + subject.loop.coulomb_n) / pushing_hand(subject).stiffness_n_per_mm;
   constexpr std::uint64_t kPlaces = 1000;
   const double x_mm = static_cast<double>(seed * 7919 % kPlaces) / kPlaces;
   const DeviceVec<double> above{x_mm, kAwayMm, 0}, pressed{x_mm, kRadiusMm - depth_mm, 0};
@@ -86,7 +87,8 @@ std::array<ArmHit, kArmHits> hits_of(const LoopCase& subject, std::uint64_t seed
            {above, pressed, kHitsMmPerS[1]},
            {above, pressed, kHitsMmPerS[2]},
            {graze, pressed, 50},
-           {corner + out * kAwayMm, corner - out * depth_mm, 50, out, dot(corner, out)}}};
+           {corner + out * kAwayMm, corner - out * depth_mm, 50, out, dot(corner, out)},
+           {above, pressed, press.hit_mm_per_s}}};
 }
 
 /// To the hit's start, at which it waits, then into the wall, where it stays. The reach ends high
@@ -99,8 +101,9 @@ HandScript script_of(const LoopCase& subject, const ArmHit& hit) {
   HandStep wait;
   wait.seconds = 0.2;
   HandStep down = hand_move(hit.to, kGentlyS);
-  if (hit.mm_per_s > 0) {
-    down.seconds = norm(hit.to - hit.from) / hit.mm_per_s;
+  const double way_mm = norm(hit.to - hit.from);
+  if (hit.mm_per_s * kGentlyS > way_mm) {
+    down.seconds = way_mm / hit.mm_per_s;
     down.ease = HandStep::Ease::linear;
   }
   script.steps = {hand_move(hit.from, kPeriods * 2 * std::numbers::pi / hand_rad_per_s), wait,
@@ -132,12 +135,12 @@ constexpr LimitCycle kLost{.swings = true, .active = true};
 
 /// Runs one hit and follows it from the first contact on. Returns the verdict; a lost device after
 /// a fault. Throws NotMet after kPatienceS without contact.
-LimitCycle watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit,
+LimitCycle watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit, double push_n,
                      const LimitCycleDetector::Ticks& limits, StepCounter& ticks,
                      const SwingWatch& watch) {
   const double rate_hz = 1 / subject.loop.period_s;
   constexpr double kPatienceS = 8;  // calibration, and the way there
-  LimitCycleDetector detector(limits, subject.loop.quantum_mm, subject.push_n);
+  LimitCycleDetector detector(limits, subject.loop.quantum_mm, push_n);
   std::int64_t away = 0;
   bool has_met = false;
   const std::int64_t settled = std::llround(0.05 * rate_hz);
@@ -217,14 +220,16 @@ LoadedScene walls_scene(const LoopCase& subject) {
 }
 
 LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
-                        double stiffness_n_per_mm, std::size_t hit, double limit_s,
-                        std::uint64_t seed, StepCounter& ticks, const SwingWatch& watch) {
+                        double stiffness_n_per_mm, std::size_t hit, const Press& press,
+                        double limit_s, std::uint64_t seed, StepCounter& ticks,
+                        const SwingWatch& watch) {
   // A tip that friction holds does not move before the hand has come to its place.
   constexpr double kRememberedS = 2 * kGentlyS;
-  const ArmHit way = hits_of(subject, seed)[hit];
+  const ArmHit way = hits_of(subject, press, seed)[hit];
   Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject, script_of(subject, way));
-  return watch_hit(rig, subject, way, hit_ticks(subject, stiffness_n_per_mm, limit_s, kRememberedS),
-                   ticks, watch);
+  return watch_hit(rig, subject, way, press.push_n,
+                   hit_ticks(subject, stiffness_n_per_mm, press, limit_s, kRememberedS), ticks,
+                   watch);
 }
 
 }  // namespace kerf::zwidth

@@ -13,7 +13,9 @@
 namespace kerf::zwidth {
 
 /// Ways in which the whole arm meets walls.
-inline constexpr std::size_t kArmHits = 5;
+inline constexpr std::size_t kArmHits = 6;
+/// That of them whose push and speed may be any; the others push with what is given, or 0.5 N.
+inline constexpr std::size_t kArmPress = 5;
 
 /// A ball of 1 mm over a flat that meets two more walls in a corner, felt by the swept contact and
 /// not cut, for the subject's device. Throws HilError for a rate that does not divide that of the
@@ -32,15 +34,17 @@ class NotMet : public HilError {
 
 /// The whole servo step, driver and emulated device in virtual time, on `walls_scene`. The hits,
 /// each from a fresh start: the hand pushes slowly, hits the flat at 50 and 200 mm/s, slides onto
-/// it at 50 mm/s, or hits the corner of three walls at 50 mm/s; then it stays. A hit is judged
+/// it at 50 mm/s, hits the corner of three walls at 50 mm/s, or meets the flat as `press` says;
+/// then it stays. Only push and speed of a press count, and of the other hits its push. A hit is
+/// judged
 /// along the normal, in the corner along the diagonal, from its first contact on, by the device's
 /// own encoders and the work of its motors. `watch` gets the device's true mechanics.
 ///
 /// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
 /// device and servo. Without a hand a spring of 0.2 N/mm pushes. Throws NotMet, or Interrupted.
 [[nodiscard]] LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
-                                      double stiffness_n_per_mm, std::size_t hit, double limit_s,
-                                      std::uint64_t seed, StepCounter& ticks,
-                                      const SwingWatch& watch = {});
+                                      double stiffness_n_per_mm, std::size_t hit,
+                                      const Press& press, double limit_s, std::uint64_t seed,
+                                      StepCounter& ticks, const SwingWatch& watch = {});
 
 }  // namespace kerf::zwidth

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <optional>
 #include <sstream>
 #include <string_view>
@@ -49,6 +51,12 @@ constexpr std::array<AxisKind, kAxisCount> kKinds{{
      "none, passivity, energy_bounding or one of your own; settings of a law as "
      "NAME/setting=value/..."},
     {"limits", "", "", 0, 0, "on off", "peak and slew of a scene; the motors stay cool"},
+    {"push", "N", "any", 0.01, 100, "any",
+     "of the hand, above friction. any: 0.5, and a search from 0.05 to 0.9 of the peak"},
+    {"hit", "mm/s", "any", 0, 2000, "any",
+     "speed of the hand at its start. any: 0, 50, 200, and a search up to 500"},
+    {"start", "mm", "any", 0, 10, "any",
+     "of the hand, before the wall. any: 0.1, and a search up to 2"},
 }};
 
 [[noreturn]] void fail(const AxisKind& kind, const std::string& text, const std::string& way_out) {
@@ -169,10 +177,12 @@ void check(AxisId axis, const std::string& value) {
       fail(kind, value, std::string("is unknown; known: ") + kind.words);
   } else {
     const auto number = number_in(value);
+    if (has_word(kind.words, value)) return;
     if (!number || *number < kind.lowest || *number > kind.highest) {
       fail(kind, value,
            "is no number from " + number_text(kind.lowest) + " to " + number_text(kind.highest) +
                (*kind.unit ? std::string(" ") + kind.unit : "") +
+               (*kind.words ? std::string(", nor ") + kind.words : "") +
                "; give one, a list (0,1,2) or a range (0:3:4: from, to, count up to " +
                std::to_string(kMostValues) + ")");
     }
@@ -242,12 +252,14 @@ AxisValues axis_values(AxisId axis, const std::string& text) {
   }
   if (values.empty()) fail(kind, text, "; give one, a list or a range (from:to:count)");
   for (const std::string& value : values) check(axis, value);
-  const auto same = [&](const std::string& a, const std::string& b) {
-    return numbers ? *number_in(a) == *number_in(b) : a == b;
+  const auto place = [](const std::string& value) {
+    constexpr double kWord = std::numeric_limits<double>::infinity();  // a word comes last
+    return number_in(value).value_or(kWord);
   };
-  if (numbers) {
-    std::ranges::stable_sort(values, {}, [](const std::string& a) { return *number_in(a); });
-  }
+  const auto same = [&](const std::string& a, const std::string& b) {
+    return numbers ? place(a) == place(b) : a == b;
+  };
+  if (numbers) std::ranges::stable_sort(values, std::less<>(), place);
   for (auto value = values.begin(); value != values.end(); ++value) {
     const auto twin = std::find_if(value + 1, values.end(),
                                    [&](const std::string& other) { return same(*value, other); });
@@ -357,6 +369,8 @@ LoopCase subject_of(const Assignment& values) {
   subject.limits = text(AxisId::limits) == "on";
   subject.device = word_of<Personality>(AxisId::device, text(AxisId::device));
   subject.mode_hz = number(AxisId::mode);
+  subject.press.given = {number_in(text(AxisId::push)), number_in(text(AxisId::hit)),
+                         number_in(text(AxisId::start))};  // any: none
   return subject;
 }
 

@@ -11,6 +11,7 @@
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/stability/sampled_loop.hpp"
+#include "lab/stability/press.hpp"
 #include "shared/wire/personality.hpp"
 
 /// The axes of a map, their values, and the loop at a wall that one value of each describes.
@@ -30,7 +31,7 @@ enum class Law : std::uint8_t {
 struct LoopCase {
   SampledLoop loop;
   double damping_ns_per_mm = 0;
-  double push_n = 0.5;  ///< of the hand, above Coulomb friction
+  PressChoice press;
   LawChoice estimator{LawKind::velocity, "foaw", {}};
   Law law = Law::coupling;
   LawChoice force_law{LawKind::force, "", {}};  ///< K and B are settings of it
@@ -76,9 +77,12 @@ enum class AxisId : std::size_t {
   numeric,
   law,
   stabiliser,
-  limits
+  limits,
+  push,
+  hit,
+  start
 };
-inline constexpr std::size_t kAxisCount = 17;
+inline constexpr std::size_t kAxisCount = 20;
 
 /// One axis as the command line knows it. A number's `lowest` and `highest` are in its unit.
 struct AxisKind {
@@ -86,7 +90,8 @@ struct AxisKind {
   const char* unit;                ///< empty: words, or a pure number
   const char* standard;            ///< value if none is given; empty: of the loop or the device
   double lowest = 0, highest = 0;  ///< both 0: words
-  const char* words = "";          ///< allowed ones, separated by blanks; empty: checked elsewhere
+  /// Allowed ones, separated by blanks, of a number beside its range; empty: checked elsewhere.
+  const char* words = "";
   const char* meaning = "";
 };
 [[nodiscard]] const std::array<AxisKind, kAxisCount>& axis_kinds();

@@ -351,6 +351,11 @@ MapSpec ZwidthCommand::spec(std::ostream& out) const {
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
                    ": device and servo have their own with --arm; leave one of the two out");
   }
+  for (const AxisId axis : {AxisId::hit, AxisId::start}) {
+    if (!arm_ || texts[index_of(axis)].empty()) continue;
+    throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
+                   ": the whole arm has hits of its own; leave one of the two out");
+  }
   if (!arm_ && !axes_[index_of(AxisId::mode)].empty()) {
     throw HilError("--mode: one axis is rigid; add --arm, or leave it out");
   }

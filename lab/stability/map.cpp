@@ -28,6 +28,31 @@
 namespace kerf::zwidth {
 namespace {
 
+/// One run: a press, and which of its seed's phases of the encoders it has; of the whole arm, which
+/// hit.
+struct Attempt {
+  Press press;
+  std::size_t nth = 0;
+};
+
+/// By which a map finds the first stiffness that is bad.
+using Rule = bool LimitCycle::*;
+
+/// The worst of some runs, and the first one that was bad by each rule.
+struct Seen {
+  LimitCycle worst;
+  Attempt swings, active;
+
+  void join(const LimitCycle& run, const Attempt& attempt) {
+    if (run.swings && !worst.swings) swings = attempt;
+    if (run.active && !worst.active) active = attempt;
+    worst.join(run);
+  }
+  [[nodiscard]] const Attempt& bad_by(Rule rule) const {
+    return rule == &LimitCycle::swings ? swings : active;
+  }
+};
+
 /// All cells of one column, each measured once.
 class ColumnRun {
  public:
@@ -40,13 +65,43 @@ class ColumnRun {
     if (spec.arm) scene_ = walls_scene(subject);
   }
 
+  Column column() {
+    Column column;
+    column.swing = first_ones(&LimitCycle::swings);
+    column.energy = first_ones(&LimitCycle::active);
+    for (const double stiffness : spec_.stiffness_n_per_mm) {
+      column.cells.push_back(cell(stiffness));
+    }
+    find_re_entry(&LimitCycle::swings, column.cells, column.swing);
+    find_re_entry(&LimitCycle::active, column.cells, column.energy);
+    for (const auto& [place, seen] : known_) {  // the lowest of all that have a verdict
+      if (!seen.worst.undecided) continue;
+      column.undecided_n_per_mm = place.first;
+      break;
+    }
+    return column;
+  }
+
+ private:
+  /// Where a seed is first bad by a rule, and by which run.
+  struct Critical {
+    double stiffness;
+    std::size_t seed;
+    Attempt attempt;
+  };
+
+  /// The worst of all seeds, and of the runs that were bad first.
   LimitCycle cell(double stiffness) {
     LimitCycle worst;
-    for (std::size_t i = 0; i < seeds_ && !worst.worst(); ++i) worst.join(at(stiffness, i));
+    for (std::size_t i = 0; i < seeds_ && !worst.worst(); ++i) worst.join(at(stiffness, i).worst);
+    for (const Critical& one : critical_) {
+      if (worst.worst()) break;
+      if (stiffness >= one.stiffness) worst.join(run(stiffness, one.seed, one.attempt, 1));
+    }
     return worst;
   }
 
-  StabilityBoundary crossing(bool LimitCycle::*rule, const std::vector<LimitCycle>& cells) {
+  StabilityBoundary first_ones(Rule rule) {
     StabilityBoundary found;
     found.last_n_per_mm = 0;
     for (std::size_t i = 0; i < seeds_; ++i) {
@@ -55,6 +110,11 @@ class ColumnRun {
       found.first_n_per_mm = std::min(found.first_n_per_mm, first);
       found.last_n_per_mm = std::max(found.last_n_per_mm, first);
     }
+    return found;
+  }
+
+  void find_re_entry(Rule rule, const std::vector<LimitCycle>& cells,
+                     StabilityBoundary& found) const {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const double stiffness = spec_.stiffness_n_per_mm[i];
       if (stiffness <= found.first_n_per_mm) continue;
@@ -65,23 +125,14 @@ class ColumnRun {
       if (found.re_entry_from_n_per_mm == 0) found.re_entry_from_n_per_mm = stiffness;
       found.re_entry_to_n_per_mm = stiffness;
     }
-    return found;
   }
 
-  /// The lowest of all that have a verdict.
-  [[nodiscard]] double undecided() const {
-    for (const auto& [place, seen] : known_) {
-      if (seen.undecided) return place.first;
-    }
-    return StabilityBoundary::kNever;
-  }
-
- private:
   /// From the lowest stiffness up, in steps so fine that an island of swings between two cells of
-  /// the map is found; then halved to 0.5 %. The whole arm, which is slower, has the map's steps.
-  double first_of(bool LimitCycle::*rule, std::size_t seed) {
+  /// the map is found; then down from there. The whole arm, which is slower, has the map's steps,
+  /// halved to 0.5 %.
+  double first_of(Rule rule, std::size_t seed) {
     constexpr double kFine = 1.01, kClose = 1.005;
-    const auto bad = [&](double stiffness) { return at(stiffness, seed).*rule; };
+    const auto bad = [&](double stiffness) { return at(stiffness, seed).worst.*rule; };
     const std::vector<double>& grid = spec_.stiffness_n_per_mm;
     if (bad(grid.front())) return 0;
     for (std::size_t cell = 1; cell < grid.size(); ++cell) {
@@ -98,6 +149,7 @@ class ColumnRun {
           low = high;
           continue;
         }
+        if (!spec_.arm) return lowest(rule, seed, at(high, seed).bad_by(rule), high);
         while (high > low * kClose) {
           const double middle = seven_digits(std::sqrt(low * high));
           (bad(middle) ? high : low) = middle;
@@ -108,7 +160,36 @@ class ColumnRun {
     return StabilityBoundary::kNever;
   }
 
-  const LimitCycle& at(double stiffness, std::size_t nth) {
+  /// Down from a stiffness at which `attempt` is bad: by that press, then by presses beside it,
+  /// from a quarter of the ranges to a thirty-second, as long as one of them is bad 2 % lower; then
+  /// halved to 0.5 %. 0: below the lowest of the map.
+  double lowest(Rule rule, std::size_t seed, Attempt attempt, double high) {
+    constexpr double kDown = 1.02, kClose = 1.005, kFirstShare = 0.25, kLastShare = 1.0 / 32;
+    const auto bad = [&](double stiffness, const Press& press) {
+      return run(stiffness, seed, {press, attempt.nth}, 1).*rule;
+    };
+    for (double share = kFirstShare; share >= kLastShare;) {
+      const double low = seven_digits(high / kDown);
+      std::vector<Press> presses = presses_beside(subject_.press, attempt.press, share);
+      presses.insert(presses.begin(), attempt.press);
+      const auto worse = std::ranges::find_if(presses, [&](const Press& p) { return bad(low, p); });
+      if (worse == presses.end()) {
+        share /= 2;
+        continue;
+      }
+      attempt.press = *worse;
+      high = low;
+      if (high < spec_.stiffness_n_per_mm.front()) return 0;
+    }
+    for (double low = seven_digits(high / kDown); high > low * kClose;) {
+      const double middle = seven_digits(std::sqrt(low * high));
+      (bad(middle, attempt.press) ? high : low) = middle;
+    }
+    critical_.push_back({high, seed, attempt});
+    return high;
+  }
+
+  const Seen& at(double stiffness, std::size_t nth) {
     const auto [place, is_new] = known_.try_emplace({stiffness, nth});
     if (is_new) place->second = measured(stiffness, nth, 1);
     return place->second;
@@ -118,34 +199,71 @@ class ColumnRun {
   const LimitCycle& looked(double stiffness, std::size_t nth) {
     constexpr double kPart = 0.2;
     const auto [place, is_new] = looked_.try_emplace({stiffness, nth});
-    if (is_new) place->second = measured(stiffness, nth, kPart);
+    if (is_new) place->second = measured(stiffness, nth, kPart).worst;
     return place->second;
   }
 
-  /// All hits of a seed, until one has shown the worst by both rules. The same places in all
-  /// columns, so that two columns differ by their values alone, whatever else the map has.
-  LimitCycle measured(double stiffness, std::size_t nth, double part) {
-    const std::uint64_t seed = spec_.seed + nth;
-    const double limit_s = part * std::max(spec_.seconds, needed_seconds(subject_, stiffness));
-    LimitCycle worst;
-    for (std::size_t hit = 0; hit < (spec_.arm ? kArmHits : kHitsMmPerS.size()); ++hit) {
-      const std::uint64_t place_of_hit = seed == 0 ? 0 : (seed << 32) + hit;
-      worst.join(spec_.arm ? hit_with_arm(scene_, subject_, stiffness, hit, limit_s, seed, ticks_)
-                           : hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], limit_s,
-                                          place_of_hit, ticks_));
-      if (worst.worst()) break;
+  /// The runs that a stiffness gets of each seed: the standard presses, and others from one
+  /// stiffness to the next, so that the steps of a search cover the ranges of what is not given.
+  /// The same in all columns, so that two columns differ by their values alone.
+  [[nodiscard]] std::vector<Attempt> attempts(double stiffness, std::size_t nth) const {
+    constexpr std::size_t kOthers = 2;
+    std::vector<Attempt> all;
+    const std::vector<Press> standard = standard_presses(subject_.press);
+    if (spec_.arm) {
+      for (std::size_t hit = 0; hit < kArmPress; ++hit) all.push_back({standard.front(), hit});
+    } else {
+      for (const Press& press : standard) all.push_back({press, all.size()});
     }
-    return is_arithmetic(worst, stiffness, limit_s)
-               ? LimitCycle{.arithmetic = true,
-                            .travel_mm = worst.travel_mm,
-                            .given_mj = worst.given_mj,
-                            .port_minimum_mj = worst.port_minimum_mj}
-               : worst;
+    if (subject_.press.is_one()) return all;
+    // Of an octave 128 parts, about 0.8 % each: the logarithm without its rounding. Seeds are far
+    // apart.
+    int octave = 0;
+    const double part = std::frexp(stiffness, &octave);
+    constexpr int kLowest = 64;
+    constexpr std::uint64_t kApart = 100'003, kSeeds = 4096;
+    const auto step = static_cast<std::uint64_t>(128 * (kLowest + octave + 2 * part));
+    const std::uint64_t first = (spec_.seed + nth) % kSeeds * kApart + step * kOthers;
+    for (std::size_t i = 0; i < (spec_.arm ? 1 : kOthers); ++i) {
+      all.push_back({press_of(subject_.press, first + i), all.size()});
+    }
+    return all;
+  }
+
+  /// All runs of a seed, until one has shown the worst by both rules.
+  Seen measured(double stiffness, std::size_t nth, double part) {
+    const std::vector<Attempt> all = attempts(stiffness, nth);
+    Seen seen;
+    for (const Attempt& attempt : all) {
+      seen.join(run(stiffness, nth, attempt, part), attempt);
+      if (seen.worst.worst()) break;
+    }
+    if (is_arithmetic(seen.worst, stiffness, all, part)) {
+      seen.worst.swings = seen.worst.active = seen.worst.undecided = false;
+      seen.worst.arithmetic = true;
+    }
+    return seen;
+  }
+
+  /// One run, to a part of the time that it needs. Nothing, if that is more than a run may last:
+  /// a flick of a heavy arm that is pushed lightly.
+  LimitCycle run(double stiffness, std::size_t nth, const Attempt& attempt, double part) {
+    const double needed_s = needed_seconds(subject_, stiffness, attempt.press);
+    if (needed_s > kLongestLimitS) return {};
+    const double limit_s = part * std::max(spec_.seconds, needed_s);
+    const std::uint64_t seed = spec_.seed + nth;
+    if (spec_.arm) {
+      return hit_with_arm(scene_, subject_, stiffness, attempt.nth, attempt.press, limit_s, seed,
+                          ticks_);
+    }
+    const std::uint64_t phase = seed == 0 ? 0 : (seed << 32) + attempt.nth;
+    return hit_one_axis(subject_, stiffness, attempt.press, limit_s, phase, ticks_);
   }
 
   /// Whether a motion that does not rest is that of fixed numbers alone: without encoder steps, too
   /// small for any encoder, and at rest in double.
-  bool is_arithmetic(const LimitCycle& fixed, double stiffness, double limit_s) {
+  bool is_arithmetic(const LimitCycle& fixed, double stiffness, const std::vector<Attempt>& all,
+                     double part) {
     constexpr double kFinestStepMm = 1e-3;  // a tenth of the omega's (docs/devices.md)
     if (fixed.rests() || fixed.travel_mm > kFinestStepMm || spec_.arm ||
         subject_.numeric != NumericKind::fixed || subject_.loop.quantum_mm > 0) {
@@ -153,8 +271,10 @@ class ColumnRun {
     }
     LoopCase exact = subject_;
     exact.numeric = NumericKind::float64;
-    return std::ranges::all_of(kHitsMmPerS, [&](double hit_mm_per_s) {
-      return hit_one_axis(exact, stiffness, hit_mm_per_s, limit_s, 0, ticks_).rests();
+    return std::ranges::all_of(all, [&](const Attempt& attempt) {
+      const double limit_s =
+          part * std::max(spec_.seconds, needed_seconds(subject_, stiffness, attempt.press));
+      return hit_one_axis(exact, stiffness, attempt.press, limit_s, 0, ticks_).rests();
     });
   }
 
@@ -162,13 +282,16 @@ class ColumnRun {
   LoopCase subject_;
   StepCounter& ticks_;
   std::size_t seeds_;
-  LoadedScene scene_;                                                    ///< of the whole arm
-  std::map<std::pair<double, std::size_t>, LimitCycle> known_, looked_;  ///< by stiffness and seed
+  LoadedScene scene_;  ///< of the whole arm
+  // By stiffness and seed.
+  std::map<std::pair<double, std::size_t>, Seen> known_;
+  std::map<std::pair<double, std::size_t>, LimitCycle> looked_;
+  std::vector<Critical> critical_;
 };
 
 }  // namespace
 
-double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm) {
+double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm, const Press& press) {
   const SampledLoop& loop = subject.loop;
   const double mass_kg = loop.mass_kg + loop.hand.mass_kg;
   const double n_per_m = 1000 * (stiffness_n_per_mm + loop.hand.stiffness_n_per_mm);
@@ -176,7 +299,7 @@ double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm) {
       1000 * (loop.viscous_ns_per_mm + subject.damping_ns_per_mm + loop.hand.damping_ns_per_mm);
   constexpr double kWindows = 16, kConstants = 12, kOfDecay = 0.01, kFall = 0.09;
   const bool creeps = ns_per_m * ns_per_m > 4 * mass_kg * n_per_m;
-  return std::max({kWindows * slowest_swing_s(subject, stiffness_n_per_mm),
+  return std::max({kWindows * slowest_swing_s(subject, stiffness_n_per_mm, press),
                    creeps ? kConstants * ns_per_m / n_per_m : 0,
                    ns_per_m > 0 ? kFall * 2 * mass_kg / (kOfDecay * ns_per_m) : 0});
 }
@@ -200,7 +323,13 @@ std::string impossible(const MapSpec& spec, const LoopCase& subject) {
     return format("rate %g Hz: a USB device has rates that divide 1000 Hz, its frames, such as 500",
                   rate_hz);
   }
-  const double needed_s = needed_seconds(subject, spec.stiffness_n_per_mm.front());
+  if (subject.limits && subject.press.given[0] >= LimitSettings().force_n) {
+    return format(
+        "push %g N is not below %g, the peak of the force: the hand goes through the wall",
+        *subject.press.given[0], LimitSettings().force_n);
+  }
+  const double needed_s = needed_seconds(subject, spec.stiffness_n_per_mm.front(),
+                                         standard_presses(subject.press).back());
   if (needed_s > kLongestLimitS) {
     return format(
         "mass %g kg, damping %g N s/mm: a hit would last %.3g s, above %g, to show whether its "
@@ -215,22 +344,14 @@ std::string impossible(const MapSpec& spec, const LoopCase& subject) {
 
 Column measure_column(const MapSpec& spec, const Assignment& values, StepCounter& ticks) {
   const LoopCase subject = subject_of(values);
-  Column column;
-  if (!impossible(spec, subject).empty()) return column;
+  if (!impossible(spec, subject).empty()) return {};
   try {
-    ColumnRun run(spec, subject, ticks);
-    for (const double stiffness : spec.stiffness_n_per_mm) {
-      column.cells.push_back(run.cell(stiffness));
-    }
-    column.swing = run.crossing(&LimitCycle::swings, column.cells);
-    column.energy = run.crossing(&LimitCycle::active, column.cells);
-    column.undecided_n_per_mm = run.undecided();
+    return ColumnRun(spec, subject, ticks).column();
   } catch (const NotMet&) {
     return {};
   } catch (const LawError& error) {
     throw HilError("--law: " + subject.force_law.name + error.what());
   }
-  return column;
 }
 
 void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, std::size_t jobs,
@@ -263,15 +384,18 @@ std::pair<double, double> cell_in(const std::string& text) {
   return {*stiffness, *damping};
 }
 
-using Curve = std::vector<SwingTick>;
-using Curves = std::vector<Curve>;  // one for each hit
+struct Curve {
+  std::string name;  ///< of the hit
+  std::vector<SwingTick> ticks;
+};
+using Curves = std::vector<Curve>;
 
 /// The curves without the points that lie within a thousandth of both axes of the last one kept: at
 /// 32 kHz there are some hundred for each that is seen.
 Json thinned(const Curves& curves) {
   double left = 0, right = 0, low = 0, high = 0;
   for (const Curve& curve : curves) {
-    for (const SwingTick& tick : curve) {
+    for (const SwingTick& tick : curve.ticks) {
       left = std::min(left, tick.tip_mm);
       right = std::max(right, tick.tip_mm);
       low = std::min(low, tick.mm_per_s);
@@ -279,14 +403,12 @@ Json thinned(const Curves& curves) {
     }
   }
   constexpr double kLeast = 1e-3;
-  constexpr std::array<const char*, kArmHits> kHits{"push", "50 mm/s", "200 mm/s", "slide",
-                                                    "corner"};
   Json hits = Json::List{};
-  for (std::size_t h = 0; h < curves.size(); ++h) {
+  for (const Curve& curve : curves) {
     Json tip = Json::List{}, speed = Json::List{};
     const SwingTick* kept = nullptr;
-    for (const SwingTick& tick : curves[h]) {
-      if (kept != nullptr && &tick != &curves[h].back() &&
+    for (const SwingTick& tick : curve.ticks) {
+      if (kept != nullptr && &tick != &curve.ticks.back() &&
           std::abs(tick.tip_mm - kept->tip_mm) <= kLeast * (right - left) &&
           std::abs(tick.mm_per_s - kept->mm_per_s) <= kLeast * (high - low)) {
         continue;
@@ -296,20 +418,31 @@ Json thinned(const Curves& curves) {
       kept = &tick;
     }
     hits.push_back(
-        {{"name", kHits[h]}, {"tip_mm", std::move(tip)}, {"mm_per_s", std::move(speed)}});
+        {{"name", curve.name}, {"tip_mm", std::move(tip)}, {"mm_per_s", std::move(speed)}});
   }
   return hits;
 }
 
 Curves curves_of(const MapSpec& spec, const LoopCase& subject, double stiffness,
                  StepCounter& ticks) {
-  Curves curves(spec.arm ? kArmHits : kHitsMmPerS.size());
+  const std::vector<Press> presses = standard_presses(subject.press);
   const LoadedScene scene = spec.arm ? walls_scene(subject) : LoadedScene();
+  const auto speed = [](double mm_per_s) {
+    return mm_per_s > 0 ? format("%g mm/s", mm_per_s) : std::string("push");
+  };
+  Curves curves;
+  if (spec.arm) {
+    for (const double mm_per_s : kHitsMmPerS) curves.push_back({speed(mm_per_s), {}});
+    curves.push_back({"slide", {}});
+    curves.push_back({"corner", {}});
+  } else {
+    for (const Press& press : presses) curves.push_back({speed(press.hit_mm_per_s), {}});
+  }
   for (std::size_t hit = 0; hit < curves.size(); ++hit) {
-    const auto watch = [&curve = curves[hit]](const SwingTick& tick) { curve.push_back(tick); };
-    static_cast<void>(spec.arm ? hit_with_arm(scene, subject, stiffness, hit, spec.seconds,
-                                              spec.seed, ticks, watch)
-                               : hit_one_axis(subject, stiffness, kHitsMmPerS[hit], spec.seconds,
+    const auto watch = [&seen = curves[hit].ticks](const SwingTick& tick) { seen.push_back(tick); };
+    static_cast<void>(spec.arm ? hit_with_arm(scene, subject, stiffness, hit, presses.front(),
+                                              spec.seconds, spec.seed, ticks, watch)
+                               : hit_one_axis(subject, stiffness, presses[hit], spec.seconds,
                                               spec.seed, ticks, watch));
   }
   return curves;

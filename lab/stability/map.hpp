@@ -19,7 +19,7 @@ namespace kerf::zwidth {
 
 /// A hit that is still open is followed for so long, s.
 inline constexpr double kLimitS = 60, kLongestLimitS = 600;
-inline constexpr std::size_t kMostSeeds = 100;
+inline constexpr std::size_t kMostSeeds = 200;
 
 /// The specification of a map. Two runs with the same value give the same map, bit for bit.
 struct MapSpec {
@@ -37,13 +37,13 @@ struct MapSpec {
 /// The stiffness at which a column stops being fine, by one rule.
 struct StabilityBoundary {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
-  /// The lowest stiffness, within 0.5 %, at which a hit of any seed is bad; 0: the lowest of all
-  /// is; kNever: none is.
+  /// The lowest stiffness, within 0.5 %, at which a press of any seed is bad, of all that were
+  /// tried; 0: the lowest of all is; kNever: none is.
   double first_n_per_mm = kNever;
   double last_n_per_mm = kNever;  ///< the largest first one of a single seed
   /// Cells above it that are fine again, their lowest and highest; 0: none.
   double re_entry_from_n_per_mm = 0, re_entry_to_n_per_mm = 0;
-  std::vector<double> by_seed_n_per_mm{};  ///< the first one of each seed; not in a map's file
+  std::vector<double> by_seed_n_per_mm{};  ///< the first one of each seed
 };
 
 /// One combination of the other axes, at all stiffnesses.
@@ -55,11 +55,12 @@ struct Column {
 };
 using Columns = std::map<std::size_t, Column>;
 
-/// The limit that a hit needs, s, that separates a swing that dies out from one that does not: in
+/// The limit that a press needs, s, that separates a swing that dies out from one that does not: in
 /// half of it eight windows of the slowest swing; twelve time constants of an overdamped creep; and
 /// if damping b takes the swing away, at the rate b/(2 m) without a wall and less and less up to
 /// the boundary, so long that at 1 % of that rate it falls by 9 %.
-[[nodiscard]] double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm);
+[[nodiscard]] double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm,
+                                    const Press& press);
 
 /// The reason if a column cannot exist: its damping alone is beyond what any sampled wall may have,
 /// the emulated device cannot have its delay or rate, or a hit would last for more than ten

@@ -2,6 +2,7 @@
 #include "lab/stability/map_file.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -18,7 +19,7 @@
 namespace kerf::zwidth {
 namespace {
 
-constexpr int kFormat = 4;  ///< of a part file
+constexpr int kFormat = 5;  ///< of a part file
 constexpr grid::PartWords kPartWords{
     .option = "--part",
     .busy = "another run is at work on it; wait for that, or name another file",
@@ -27,7 +28,7 @@ constexpr grid::PartWords kPartWords{
 
 Json json_of(const StabilityBoundary& crossing) {
   return Json{
-      {"first", Json::List{crossing.first_n_per_mm, crossing.last_n_per_mm}},  // null: never
+      {"first", crossing.by_seed_n_per_mm},  // null: never
       {"re_entry", Json::List{crossing.re_entry_from_n_per_mm, crossing.re_entry_to_n_per_mm}}};
 }
 
@@ -36,8 +37,16 @@ double stiffness_in(const Json& json) {
 }
 
 StabilityBoundary crossing_in(const Json& json) {
-  return {stiffness_in(json.at("first").at(0)), stiffness_in(json.at("first").at(1)),
-          json.at("re_entry").at(0).get<double>(), json.at("re_entry").at(1).get<double>()};
+  StabilityBoundary found;
+  for (const Json& first : json.at("first")) found.by_seed_n_per_mm.push_back(stiffness_in(first));
+  if (!found.by_seed_n_per_mm.empty()) {
+    const auto [first, last] = std::ranges::minmax(found.by_seed_n_per_mm);
+    found.first_n_per_mm = first;
+    found.last_n_per_mm = last;
+  }
+  found.re_entry_from_n_per_mm = json.at("re_entry").at(0).get<double>();
+  found.re_entry_to_n_per_mm = json.at("re_entry").at(1).get<double>();
+  return found;
 }
 
 std::string line_of(std::size_t index, const Column& column) {
@@ -142,7 +151,9 @@ void check_spec(const MapSpec& spec) {
   if (!(spec.seconds >= kLimitS && spec.seconds <= kLongestLimitS)) {
     throw HilError("--seconds: not within 60 and 600");
   }
-  if (spec.seeds < 1 || spec.seeds > kMostSeeds) throw HilError("--seeds: not within 1 and 100");
+  if (spec.seeds < 1 || spec.seeds > kMostSeeds) {
+    throw HilError("--seeds: not within 1 and " + std::to_string(kMostSeeds));
+  }
 }
 
 /// Identifies the map of a part, without shard and program.
@@ -173,17 +184,32 @@ Json stiffness_json(double n_per_mm) {
   return is_one ? Json(n_per_mm) : Json(nullptr);
 }
 
+/// The crossing of a part of the seeds, by nearest rank.
+double seed_at(std::vector<double> by_seed, double part) {
+  if (by_seed.empty()) return 0;
+  std::ranges::sort(by_seed);
+  const auto rank = static_cast<std::size_t>(std::ceil(part * double(by_seed.size())));
+  return by_seed[std::max<std::size_t>(1, rank) - 1];
+}
+
 Json crossing_json(const Column& column, const StabilityBoundary& crossing) {
+  constexpr double kLowPart = 0.05, kHighPart = 0.95;
+  Json by_seed = Json::List{};
+  for (const double first : crossing.by_seed_n_per_mm) by_seed.push_back(stiffness_json(first));
   const auto reason = [&](double n_per_mm) {
     const std::string text = no_crossing(column, n_per_mm);
     return text.empty() ? Json(nullptr) : Json(text);
   };
-  return Json{{"first_n_per_mm", stiffness_json(crossing.first_n_per_mm)},
-              {"reason", reason(crossing.first_n_per_mm)},
-              {"last_n_per_mm", stiffness_json(crossing.last_n_per_mm)},
-              {"last_reason", reason(crossing.last_n_per_mm)},
-              {"re_entry_from_n_per_mm", stiffness_json(crossing.re_entry_from_n_per_mm)},
-              {"re_entry_to_n_per_mm", stiffness_json(crossing.re_entry_to_n_per_mm)}};
+  return Json{
+      {"first_n_per_mm", stiffness_json(crossing.first_n_per_mm)},
+      {"reason", reason(crossing.first_n_per_mm)},
+      {"last_n_per_mm", stiffness_json(crossing.last_n_per_mm)},
+      {"last_reason", reason(crossing.last_n_per_mm)},
+      {"by_seed_n_per_mm", std::move(by_seed)},
+      {"band_n_per_mm", Json::List{stiffness_json(seed_at(crossing.by_seed_n_per_mm, kLowPart)),
+                                   stiffness_json(seed_at(crossing.by_seed_n_per_mm, kHighPart))}},
+      {"re_entry_from_n_per_mm", stiffness_json(crossing.re_entry_from_n_per_mm)},
+      {"re_entry_to_n_per_mm", stiffness_json(crossing.re_entry_to_n_per_mm)}};
 }
 
 template <class Each>
@@ -195,6 +221,7 @@ void each_axis(const Each& each) {
 std::string column_name(const AxisKind& kind) {
   const std::string unit = kind.unit;
   if (unit == "N s/mm") return std::string(kind.name) + "_ns_per_mm";
+  if (unit == "mm/s") return std::string(kind.name) + "_mm_per_s";
   if (unit.empty()) return kind.name;
   std::string name = std::string(kind.name) + "_" + unit;
   for (char& letter : name) {

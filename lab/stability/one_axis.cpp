@@ -133,17 +133,17 @@ double shift_of(std::uint64_t seed) {
 }
 
 template <class N>
-LimitCycle hit(const LoopCase& subject, double stiffness, double hit_mm_per_s, double limit_s,
+LimitCycle hit(const LoopCase& subject, double stiffness, const Press& press, double limit_s,
                std::uint64_t seed, StepCounter& ticks, const SwingWatch& watch) {
   const SampledLoop& loop = subject.loop;
-  const double push_n = loop.coulomb_n + subject.push_n;
+  const double push_n = loop.coulomb_n + press.push_n;
   AxisSimulation axis(loop, shift_of(seed) * loop.quantum_mm);
-  axis.start(kStartMm, -hit_mm_per_s);
+  axis.start(press.start_mm, -press.hit_mm_per_s);
   OneAxisWall<N> wall(subject, stiffness, axis.encoder_mm());
 
   constexpr double kRememberedS = 0.2, kFarMm = 1e4;  // no motion comes back from there
-  LimitCycleDetector detector(hit_ticks(subject, stiffness, limit_s, kRememberedS), loop.quantum_mm,
-                              push_n);
+  LimitCycleDetector detector(hit_ticks(subject, stiffness, press, limit_s, kRememberedS),
+                              loop.quantum_mm, push_n);
   double last_n = 0;
   while (true) {
     const double asked_n = wall.force(axis.encoder_mm());
@@ -160,39 +160,44 @@ LimitCycle hit(const LoopCase& subject, double stiffness, double hit_mm_per_s, d
 
 }  // namespace
 
-double slowest_swing_s(const LoopCase& subject, double stiffness_n_per_mm) {
+double slowest_swing_s(const LoopCase& subject, double stiffness_n_per_mm, const Press& press) {
   const SampledLoop& loop = subject.loop;
   const double mass_kg = loop.mass_kg + loop.hand.mass_kg;
   const double n_per_m = 1000 * (stiffness_n_per_mm + loop.hand.stiffness_n_per_mm);
   const double period_s = 2 * std::numbers::pi * std::sqrt(mass_kg / n_per_m);
   const double delay_s = loop.delay_s + loop.period_s;
-  const double let_go_s = 2 * LimitSettings().force_n * delay_s / subject.push_n;
-  constexpr double kFastestMPerS = kHitsMmPerS.back() / 1000;
-  const double thrown_s = 2 * mass_kg * kFastestMPerS / subject.push_n;
+  const double let_go_s = 2 * LimitSettings().force_n * delay_s / press.push_n;
+  constexpr double kLeastMPerS = kHitsMmPerS.back() / 1000;
+  const double hit_m_per_s = press.hit_mm_per_s / 1000, start_m = press.start_mm / 1000;
+  const double came_m_per_s =
+      std::sqrt(hit_m_per_s * hit_m_per_s + 2 * press.push_n * start_m / mass_kg);
+  const double impulse_ns = 2 * mass_kg * std::max(kLeastMPerS, came_m_per_s);
+  const double left_n = LimitSettings().force_n - press.push_n;  // that the wall turns it back with
+  const double flight_s = std::max({let_go_s, impulse_ns / press.push_n,
+                                    subject.limits && left_n > 0 ? impulse_ns / left_n : 0});
   constexpr double kLeastS = 0.25;
-  return std::max(kLeastS, period_s + std::max(let_go_s, thrown_s));
+  return std::max(kLeastS, period_s + flight_s);
 }
 
 LimitCycleDetector::Ticks hit_ticks(const LoopCase& subject, double stiffness_n_per_mm,
-                                    double limit_s, double remembered_s) {
+                                    const Press& press, double limit_s, double remembered_s) {
   const double period_s = subject.loop.period_s;
   constexpr int kSwings = 4;  // two in half a run: its travel is then from peak to peak
   return {
       .limit = std::llround(limit_s / period_s),
-      .first = std::llround(kSwings * slowest_swing_s(subject, stiffness_n_per_mm) / period_s),
+      .first =
+          std::llround(kSwings * slowest_swing_s(subject, stiffness_n_per_mm, press) / period_s),
       .settled =
           std::llround(remembered_s / period_s) + static_cast<std::int64_t>(kMaxDelayPeriods) +
           VelocityWindow<DoubleNumbers>::kIntervals * VelocityWindow<DoubleNumbers>::kMaxStride};
 }
 
-LimitCycle hit_one_axis(const LoopCase& subject, double stiffness_n_per_mm, double hit_mm_per_s,
+LimitCycle hit_one_axis(const LoopCase& subject, double stiffness_n_per_mm, const Press& press,
                         double limit_s, std::uint64_t seed, StepCounter& ticks,
                         const SwingWatch& watch) {
   return subject.numeric == NumericKind::fixed
-             ? hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, limit_s, seed, ticks,
-                                 watch)
-             : hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, limit_s, seed, ticks,
-                                  watch);
+             ? hit<FixedNumbers>(subject, stiffness_n_per_mm, press, limit_s, seed, ticks, watch)
+             : hit<DoubleNumbers>(subject, stiffness_n_per_mm, press, limit_s, seed, ticks, watch);
 }
 
 }  // namespace kerf::zwidth

@@ -15,9 +15,9 @@ class Map:
     """A stability map. Its arrays have one axis for each name in `axes`, in their order, and the stiffness last.
 
     stiffness_n_per_mm: (K,), N/mm. axes: {name: list of its values as texts}. rests, swings, active, undecided, arithmetic:
-    bool (..., K): the verdict on the worst of all seeds and of hits at 0, 50 and 200 mm/s; see kerf.Verdict. travel_mm, given_mj:
+    bool (..., K): the verdict on the worst of all seeds and presses; see kerf.Verdict. travel_mm, given_mj:
     float64 (..., K) of that run. first_swing_n_per_mm, first_energy_n_per_mm: float64 (...): the lowest K, within 0.5 %, at which a
-    hit of any seed swings, or gives energy; 0: the lowest of all does; inf: none does. swing_by_seed_n_per_mm,
+    press of any seed swings, or gives energy; 0: the lowest of all does; inf: none does. swing_by_seed_n_per_mm,
     energy_by_seed_n_per_mm: float64 (..., seeds): those of each seed alone. impossible: texts (...): why a column has no cells; empty:
     it has. Without cells flags are False and numbers NaN."""
     stiffness_n_per_mm: np.ndarray
@@ -41,9 +41,10 @@ def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, direction="", *
 
     stiffness: N/mm, "0.05:50:40" (from:to:count, even in the ratio), or numbers. axes: the options of `kerf lab zwidth --help` by
     their names: device, damping (N s/mm), rate (Hz), delay (periods), mass (kg), law, estimator and so on; each a value, a list or
-    array, or "from:to:count". The device is an emulated one, with a delay of one period unless `delay` says otherwise: map_loop has
-    its figures. It may also be one of touch, omega and inverse3, alone, or one device.toml of kerf identify, across `direction`: "x",
-    "y", "z", such as "1,0,1", or "worst", as if it is empty: the one of 13 with the lowest boundary. seeds: so many of the encoders' steps against the wall, from
+    array, or "from:to:count". push (N), hit (mm/s) and start (mm) are searched unless they are given (docs/stability.md). The device is
+    an emulated one, with a delay of one period unless `delay` says otherwise: map_loop has its figures. It may also be one of touch,
+    omega and inverse3, alone, or one device.toml of kerf identify, across `direction`: "x", "y", "z", such as "1,0,1", or "worst", as
+    if it is empty: the one of 13 with the lowest boundary. seeds: so many of the encoders' steps against the wall, from
     `seed` on. seconds: to which a run that is still open is followed, at least. threads: 0
     for all cores; the map is the same. Returns a kerf.Map. Takes seconds to hours (docs/stability.md); Ctrl-C raises
     kerf.Interrupted with the Map of the columns that are done. Raises kerf.Error."""
@@ -137,13 +138,14 @@ class Cell:
     period_s: float
 
 
-def cell(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=1000.0, loop=None, push_n=0.5, hit_mm_per_s=0.0, seconds=60.0,
-         seed=1, law="coupling", estimator="foaw", numeric="fixed", limits=True):
-    """One run of a cell of a map, with what moved: a hand meets a wall at `hit_mm_per_s` and goes on pushing.
+def cell(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=1000.0, loop=None, push_n=0.5, hit_mm_per_s=0.0, start_mm=0.1,
+         seconds=60.0, seed=1, law="coupling", estimator="foaw", numeric="fixed", limits=True):
+    """One run of a cell of a map, with what moved: a hand starts `start_mm` before a wall at `hit_mm_per_s` and goes on pushing.
 
     stiffness_n_per_mm, damping_ns_per_mm: of the wall, N/mm and N s/mm. device, rate_hz: whose loop, map_loop, unless `loop`, a
     kerf.SampledLoop, is given. push_n: of the hand, above Coulomb friction, N. seconds: to which a run that is still open is followed. seed: shifts the
-    encoder's steps against the wall; 0: one lies on it. In a map, seed s and hit number h (0, 50, 200 mm/s) have s * 2**32 + h. law:
+    encoder's steps against the wall; 0: one lies on it. In a map, seed s and press number h (of 0.5 N from 0.1 mm: 0, 50, 200 mm/s) have
+    s * 2**32 + h. law:
     "coupling", "linear", "two_sided", the name of a law, or a function as of Loop.law, which gets the stiffness and damping, too.
     numeric: "fixed" or "double". limits: peak and slew of the default device. The same values give the same bits. Returns a
     kerf.Cell. Raises kerf.Error."""
@@ -152,7 +154,7 @@ def cell(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=10
     run = _kerf.WallRun()
     run.loop = loop if loop is not None else map_loop(device, rate_hz)
     run.stiffness_n_per_mm, run.damping_ns_per_mm = stiffness_n_per_mm, damping_ns_per_mm
-    run.push_n, run.hit_mm_per_s, run.seconds, run.seed = push_n, hit_mm_per_s, seconds, seed
+    run.push_n, run.hit_mm_per_s, run.start_mm, run.seconds, run.seed = push_n, hit_mm_per_s, start_mm, seconds, seed
     run.estimator, run.fixed_point, run.limits = estimator, numeric == "fixed", limits
     function = law if callable(law) else None
     if function is None:

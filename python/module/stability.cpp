@@ -188,6 +188,7 @@ void define_stability(py::module_& module) {
       .def_readwrite("damping_ns_per_mm", &WallRun::damping_ns_per_mm)
       .def_readwrite("push_n", &WallRun::push_n)
       .def_readwrite("hit_mm_per_s", &WallRun::hit_mm_per_s)
+      .def_readwrite("start_mm", &WallRun::start_mm)
       .def_readwrite("seconds", &WallRun::seconds)
       .def_readwrite("seed", &WallRun::seed)
       .def_readwrite("law", &WallRun::law)

@@ -314,13 +314,14 @@ class TestMaps(Case):
 
     def test_a_cell_is_that_of_the_map_and_has_its_trajectory(self):
         for device, grid in (("falcon", [0.5, 7, 7.5, 20]), ("omega", [0.5, 2, 5, 20])):
-            made = kerf.zwidth(device=device, stiffness=grid, damping=0.002, seeds=1)
+            hits = (0, 50, 200)
+            made = kerf.zwidth(device=device, stiffness=grid, damping=0.002, seeds=1, push=0.5, hit=list(hits), start=0.1)
             flags = []
-            for at, stiffness in enumerate(grid):
-                cells = [kerf.cell(stiffness, 0.002, device, hit_mm_per_s=speed, seed=(1 << 32) + hit) for hit, speed in enumerate((0, 50, 200))]
-                flags.append(any(one.verdict.swings for one in cells))
-            self.assertEqual(flags, made.swings.reshape(4).tolist(), device)
-            self.assertEqual(len(set(flags)), 2, device)
+            for stiffness in grid:
+                cells = [kerf.cell(stiffness, 0.002, device, hit_mm_per_s=speed, seed=1 << 32) for speed in hits]
+                flags.append([one.verdict.swings for one in cells])
+            self.assertEqual(np.transpose(flags).tolist(), made.swings.reshape(3, 4).tolist(), device)
+            self.assertEqual(len(set(sum(flags, []))), 2, device)
             self.assertEqual(cells[0].trajectory.shape[1], 2)
             self.assertLess(np.abs(cells[1].trajectory[0] - (0.1 - 0.05, -50)).max(), 10)
         law = kerf.cell(0.5, 0.002, "falcon", seconds=1, numeric="double", law=lambda d: d.stiffness_n_per_mm * d.spring_mm)
