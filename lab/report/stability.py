@@ -59,15 +59,14 @@ verdict of all. `--push`, `--hit` and `--start` set one of the three, or a list 
 * There is no thermal limit: weaker motors would end an oscillation.
 
 A seed sets the phase of the encoder steps relative to the wall, which at one press is worth up to a factor of two in K,
-and where the sequence of presses begins. It is
-equal in every column, so that two columns differ by their axes alone. `--seed` is the first seed, `--seeds` their
-number, 5 unless given.
+and where the sequence of presses begins. It is equal in every column, so that two columns differ by their axes alone.
+`--seed` is the first seed, `--seeds` their number, 5 unless given.
 
 *One axis* runs the servo's own coupling, velocity estimator, stabilisers and force limits, as the same templates and in
 the loop's numbers, with exact mechanics. *Whole arm* (`--arm`) runs the servo step with the emulated device, its driver
-and its packets in virtual time; it also slides onto the flat and hits the corner of three walls, and one press of the
-sequence is flat on. The mechanics are
-plausible values, not those of a unit: for your device, give `--mass`, `--viscous`, `--friction` and `--quantum`.
+and its packets in virtual time; it also slides onto the flat and hits the corner of three walls, and has one press of
+the sequence at each stiffness. The mechanics are plausible values, not those of a unit: for your device, give `--mass`,
+`--viscous`, `--friction` and `--quantum`.
 
 """
 
@@ -81,7 +80,7 @@ device's map.
 * Each measured K is the lowest of five seeds; undecided counts as unstable. The whole arm has 14 stiffnesses.
 * *Recommended K* is the minimum of the row over 1.5. The margin covers phases and islands between two steps that no run
   of the map met. Of 10,000 random presses at each of them none oscillates or is active (`zwidth_maps`, the part `ranges`
-  of `.ci/all`); five in 180,000 are undecided: push and twice the friction are the peak there, so the tip creeps out.
+  of `.ci/all`); a few in 180,000 are undecided: push and twice the friction are the peak there, so the tip creeps out.
 * The delay of a real device is not known; assume two periods until you measure it.
 * Take no more damping than the map shows as stable: beyond its maximum the lag of the velocity and the encoder steps
   drive the oscillation.
