@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 
 // A device as `kerf identify` found it (docs/identify.md): what a file device.toml has, for maps,
