@@ -71,11 +71,18 @@ class TestGuided(unittest.TestCase):
         scene = self.home / "scene.toml"
         scene.write_text(pathlib.Path(SCENE).read_text().replace("[hand]\nscript = \"hands/touch.toml\"", "")
                          + "\n[device]\npersonality = \"omega\"\nidentified = \"device.toml\"\n")
-        options = types.SimpleNamespace(scene=str(scene), device=None, port=None, log=str(self.home / "log"))
-        guided.record(BIN, options, SHORT_S)
-        motion, lines = log_motion.read(options.log)
-        self.assertEqual([line for line in lines if "fault" in line], [])
-        found = estimate.estimate(motion)
+        # Real time: of three tries one at least is not spoilt by what else the machine does.
+        for attempt in range(3):
+            options = types.SimpleNamespace(scene=str(scene), device=None, port=None, log=str(self.home / f"log{attempt}"))
+            guided.record(BIN, options, SHORT_S)
+            motion, lines = log_motion.read(options.log)
+            self.assertEqual([line for line in lines if "fault" in line], [])
+            try:
+                found = estimate.estimate(motion)
+                break
+            except estimate.NoEstimate:
+                if attempt == 2:
+                    raise
         self.assertEqual(found.moved, ["x", "y", "z"])
         self.assertLess(np.abs(found.values[:3] / 0.12 - 1).max(), 0.05)
         self.assertLess(np.abs(found.values[9:12] / 0.15 - 1).max(), 0.1)
