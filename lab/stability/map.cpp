@@ -207,6 +207,7 @@ class ColumnRun {
   /// stiffness to the next, so that the steps of a search cover the ranges of what is not given.
   /// The same in all columns, so that two columns differ by their values alone.
   [[nodiscard]] std::vector<Attempt> attempts(double stiffness, std::size_t nth) const {
+    // Without any the first swing of an Omni without delay at B = 0.02 N s/mm is 5.7, not 2.6.
     constexpr std::size_t kOthers = 2;
     std::vector<Attempt> all;
     const std::vector<Press> standard = standard_presses(subject_.press);

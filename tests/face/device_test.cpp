@@ -65,6 +65,18 @@ kerf::TickRecord record_of(std::uint64_t tick) {
   return record;
 }
 
+/// One number in all places: a torn one has two.
+kerf::ProgramForce all_of(double i) {
+  return {
+      .force_n = {i, i, i}, .goal_mm = {i, i, i}, .stiffness_n_per_mm = i, .damping_ns_per_mm = i};
+}
+
+bool is_whole(const kerf::ProgramForce& force) {
+  const double i = force.force_n[0];
+  return force.force_n == std::array{i, i, i} && force.goal_mm == std::array{i, i, i} &&
+         force.stiffness_n_per_mm == i && force.damping_ns_per_mm == i;
+}
+
 std::string problem_of(const std::string& name) {
   try {
     static_cast<void>(kerf::Device::open(name));
@@ -228,23 +240,14 @@ TEST_CASE("a force of a program that writes without a pause is whole") {
   std::atomic<bool> stop{false};
   std::jthread program([&] {
     auto device = kerf::Device::open("d");
-    for (double i = 1; !stop; ++i) {
-      device.give({.force_n = {i, i, i},
-                   .goal_mm = {i, i, i},
-                   .stiffness_n_per_mm = i,
-                   .damping_ns_per_mm = i});
-    }
+    for (double i = 1; !stop; ++i) device.give(all_of(i));
   });
   int torn = 0;
   for (int taken = 0; taken < 100'000;) {
     kerf::ProgramForce force;
     if (!page.take(0, force)) continue;
     ++taken;
-    const double i = force.force_n[0];
-    const bool whole = force.force_n == std::array{i, i, i} &&
-                       force.goal_mm == std::array{i, i, i} && force.stiffness_n_per_mm == i &&
-                       force.damping_ns_per_mm == i;
-    torn += whole ? 0 : 1;
+    torn += is_whole(force) ? 0 : 1;
   }
   stop = true;
   CHECK(torn == 0);
@@ -258,10 +261,7 @@ TEST_CASE("neither side sees half of what the other one writes") {
     auto device = kerf::Device::open("d");
     std::uint64_t last = 0;
     for (double i = 1; !stop; ++i) {
-      device.give({.force_n = {i, i, i},
-                   .goal_mm = {i, i, i},
-                   .stiffness_n_per_mm = i,
-                   .damping_ns_per_mm = i});
+      device.give(all_of(i));
       if (!device.wait()) break;
       const kerf::DeviceState& now = device.state();
       const auto t = static_cast<double>(now.tick);
@@ -276,11 +276,7 @@ TEST_CASE("neither side sees half of what the other one writes") {
     kerf::ProgramForce force;
     if (page.take(0, force)) {
       ++taken;
-      const double i = force.force_n[0];
-      CHECK(force.force_n == std::array{i, i, i});
-      CHECK(force.goal_mm == std::array{i, i, i});
-      CHECK(force.stiffness_n_per_mm == i);
-      CHECK(force.damping_ns_per_mm == i);
+      CHECK(is_whole(force));
     }
     page.publish(0, record_of(tick));
     std::this_thread::yield();
