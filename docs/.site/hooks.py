@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hooks of mkdocs. The first page of the site is README, with its links seen from docs/.
+"""Hooks of mkdocs. The first page of the site is overview.md, and README is its page start.md, with its links seen from docs/.
 
 The site works from a folder, without a server, and omits what no page uses. A browser loads no JSON from a folder, so the
 search of mkdocs finds nothing there. The index becomes a script, and search.js beside this file searches it."""
@@ -22,12 +22,14 @@ FONTS = ("fonts", "webfonts")  # their folder in Debian 12, and since Debian 13
 
 
 def on_files(files, config):
-    readme = (pathlib.Path(config["docs_dir"]).parent / "README.md").read_text(encoding="utf-8")
-    page = re.sub(r"\]\(docs/", "](", readme)
+    docs = pathlib.Path(config["docs_dir"])
+    page = re.sub(r"\]\(docs/", "](", (docs.parent / "README.md").read_text(encoding="utf-8"))
     page = re.sub(r"\[(`[^`\]]+`)\]\([A-Z]+\.md\)", r"\1", page)  # a file that is no page of the site
+    files.remove(files.get_file_from_path("overview.md"))
     folder = tempfile.mkdtemp()  # mkdocs reads it when it builds
-    pathlib.Path(folder, "index.md").write_text(page, encoding="utf-8")
-    files.append(File("index.md", folder, config["site_dir"], config["use_directory_urls"]))
+    for name, text in (("start.md", page), ("index.md", (docs / "overview.md").read_text(encoding="utf-8"))):
+        pathlib.Path(folder, name).write_text(text, encoding="utf-8")
+        files.append(File(name, folder, config["site_dir"], config["use_directory_urls"]))
     return files
 
 
@@ -106,7 +108,7 @@ def with_links(text, docs):
         if not page or not page.exists():
             return found[0]
         section = found["section"] or ""
-        return f"[{found[0]}]({found['page']}{anchor_of(page, section)})"
+        return f"[{found[0]}]({'index.md' if page.name == 'overview.md' else page.name}{anchor_of(page, section)})"
     return NAMED.sub(link, text)
 
 
@@ -119,6 +121,7 @@ def with_formulas(text):
 def on_page_markdown(markdown, page, config, **_):
     docs, name = pathlib.Path(config["docs_dir"]), page.file.src_path
     lines, block, fenced = [], [], False
+    markdown = markdown.replace("](overview.md", "](index.md")
     for line, code in zip(*(one + [end] for one, end in zip(as_python_markdown(markdown), ("", 0)))):
         if code:
             block.append(line)

@@ -3,7 +3,7 @@
 """The site of `./kerf docs` as its reader has it, from a folder:  site_test.py ROOT
 
 It is small, loads nothing from elsewhere, leaves no Markdown as text, has every page in its list, and its search finds. Its formulas
-are drawn, it fits on a phone, and it can be read in the dark. Exit code 77: skipped, for
+and drawings can be read, it fits on a phone, and it can be read in the dark. Exit code 77: skipped, for
 want of mkdocs, or of chromium once all else is fine."""
 import html.parser
 import itertools
@@ -21,6 +21,7 @@ import browser
 import pages
 
 MOST_BYTES = 5_000_000
+NAMES = {"README": "start", "overview": "index"}  # pages of another name on the site
 # What a reader types, and the section that must come among the first three.
 NARROW = 390  # pixels of a phone
 SEARCHES = [("zigzag_mm", "script-keys.html#hands"), ("exit codes", "reports.html#exit-codes"),
@@ -85,7 +86,7 @@ def headings_of(markdown):
 
 def faults_of_prose(site):
     for page in pages.all_pages(root):
-        file = site / ("index.html" if page.name == "README.md" else f"{page.stem}.html")
+        file = site / f"{NAMES.get(page.stem, page.stem)}.html"
         shown, told = Prose(file.read_text(encoding="utf-8")), list(headings_of(page.read_text(encoding="utf-8")))
         for there, said in itertools.zip_longest(shown.headings, told):
             if there != said:
@@ -114,10 +115,25 @@ def faults_of_files(site):
                 yield f"{file.name}: loads {address}, which is not there"
     listed = (root / "mkdocs.yml").read_text(encoding="utf-8")
     for file in (root / "docs").glob("*.md"):
-        if f": {file.name}\n" not in listed:
+        if f": {NAMES.get(file.stem, file.stem)}.md\n" not in listed:
             yield f"mkdocs.yml: does not list {file.name}"
         if not re.search(rf"^\| .*`(docs/)?{re.escape(file.name)}`", (root / "README.md").read_text(), re.M):
             yield f"README.md: its table of pages lacks {file.name}"
+
+
+def faults_of_drawings():
+    """A drawing has its text as text that can be read on a phone, a title for those who hear it, and colours for the dark."""
+    margin, least = 30, 9.5  # pixels beside a picture, and of a letter's height
+    for file in sorted((root / "docs/images").glob("*.svg")):
+        text = file.read_text(encoding="utf-8")
+        wide = float(re.search(r'viewBox="0 0 (\d+)', text)[1])
+        smallest = min(float(size) for size in re.findall(r"font-size[:=]\W*(\d+)", text))
+        for fault, found in (("no title", "<title" not in text), ("no text", "<text" not in text),
+                             ("no colours for the dark", "prefers-color-scheme: dark" not in text),
+                             (f"letters of {smallest * (NARROW - margin) / wide:.1f} pixels on a phone",
+                              smallest * min(1, (NARROW - margin) / wide) < least)):
+            if found:
+                yield f"{file.name}: {fault}"
 
 
 def faults_of_search(site, chromium):
@@ -207,7 +223,7 @@ def main():
         site = pathlib.Path(folder) / "site"
         subprocess.run(["mkdocs", "build", "--quiet", "--strict", "--config-file", root / "mkdocs.yml", "--site-dir", site],
                        check=True)
-        wrong = [*faults_of_files(site), *faults_of_prose(site), *faults_of_formulas(site)]
+        wrong = [*faults_of_files(site), *faults_of_prose(site), *faults_of_formulas(site), *faults_of_drawings()]
         chromium = browser.find_chromium()
         if chromium:
             wrong += [*faults_of_search(site, chromium), *faults_of_looks(site, chromium)]
