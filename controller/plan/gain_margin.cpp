@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "controller/law/registry/law_registry.hpp"
@@ -131,18 +132,31 @@ void set_worst_slope(const LoadedScene& scene, const SampledLoop& loop, GainMarg
 
 /// From the linear boundary upwards in steps of 1 %, to the first wall on which a push is not
 /// proven to come to rest: with friction and an encoder, walls that rest lie above others that
-/// swing. Damping that is unstable without any wall has no such boundary: friction stops only small
-/// swings then, even if one push decays.
-double with_friction(const SampledLoop& loop, double damping, double linear_n_per_mm) {
+/// swing. The push is half of the contact's largest force: there a swing has the most room between
+/// no force and that one, and the larger it is, the less friction holds it (docs/theory.md 5.7).
+/// Damping that is unstable without any wall has no such boundary: friction stops only small swings
+/// then, even if one push decays.
+double with_friction(const SampledLoop& loop, double damping, double linear_n_per_mm,
+                     double push_n) {
   if (damping > highest_damping(loop)) return 0;
   const auto rests = [&](double stiffness) {
-    return push_on_wall(loop, stiffness, damping, {.push_n = 1}).rests();
+    return push_on_wall(loop, stiffness, damping, {.push_n = push_n}).rests();
   };
   constexpr double kStep = 1.01;
   double stable = std::max(linear_n_per_mm, kMinStiffnessNPerMm);
   if (!rests(stable)) return linear_n_per_mm;
   while (stable < kMostNPerMm && rests(kStep * stable)) stable *= kStep;
   return stable;
+}
+
+/// That the contact of a scene can have at the device: the limit's, or what the paper's force has
+/// at half of the ball's depth, p0 pi R^2 (docs/theory.md 7.1).
+double largest_force_n(const LoadedScene& scene) {
+  const double limit_n = scene.limits.force_n;
+  if (scene.force.model != ForceModel::paper) return limit_n;
+  const double radius_mm = scene.tools[scene.active_tool].radius_mm;
+  return std::min(limit_n, scene.device.workspace_scale * scene.force.p0_n_per_mm2 *
+                               std::numbers::pi * radius_mm * radius_mm);
 }
 
 /// Begin of a remedy.
@@ -186,8 +200,8 @@ GainMargin gain_margin(const LoadedScene& scene, PlayFriction friction) {
     margin.highest_n_per_mm = highest_stiffness(loop, margin.damping_ns_per_mm);
   }
   if (margin.friction_decides || friction == PlayFriction::always) {
-    margin.highest_with_friction_n_per_mm =
-        with_friction(loop, margin.damping_ns_per_mm, margin.highest_n_per_mm);
+    margin.highest_with_friction_n_per_mm = with_friction(
+        loop, margin.damping_ns_per_mm, margin.highest_n_per_mm, largest_force_n(scene) / 2);
   }
   return margin;
 }

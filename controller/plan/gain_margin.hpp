@@ -29,7 +29,7 @@ struct GainMargin {
   double stiffness_n_per_mm = 0;  ///< at the device
   double damping_ns_per_mm = 0;
   double highest_n_per_mm = 0;                ///< stiffness at the boundary, without friction
-  double highest_with_friction_n_per_mm = 0;  ///< with it, from a push of 1 N
+  double highest_with_friction_n_per_mm = 0;  ///< with it, at the worst push
   bool friction_decides = false;              ///< of the paper's force
   double spring_mm = 0;  ///< of a force law: the length of these values; else 0
 
