@@ -2,7 +2,7 @@
 """Hooks of mkdocs. The first page of the site is overview.md, and README is its page start.md, with its links seen from docs/.
 
 The site works from a folder, without a server, and omits what no page uses. A browser loads no JSON from a folder, so the
-search of mkdocs finds nothing there. The index becomes a script, and search.js beside this file searches it."""
+search of mkdocs finds nothing there. The index becomes a script, in which find.js finds, by lunr, which comes with mkdocs (MIT)."""
 import json
 import pathlib
 import re
@@ -166,11 +166,12 @@ def on_post_build(config):
     sections = [[one["location"], pages[one["location"].split("#")[0]], one["title"], one["text"]]
                 for one in found if "#" in one["location"]]
     for file in search.iterdir():
-        file.unlink()
+        if file.name != "lunr.js":
+            file.unlink()
     words = json.dumps(sections, ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")
     (search / "index.js").write_text(f"const searchIndex = {words};\n", encoding="utf-8")
-    (search / "main.js").write_text((HERE / "search.js").read_text(encoding="utf-8"), encoding="utf-8")
-    (site / "css" / "kerf.css").write_text((HERE / "kerf.css").read_text(encoding="utf-8"), encoding="utf-8")
+    for name, place in (("search.js", search / "main.js"), ("find.js", search / "find.js"), ("kerf.css", site / "css" / "kerf.css")):
+        place.write_text((HERE / name).read_text(encoding="utf-8"), encoding="utf-8")
     with_newest_fonts(site)
     for file in (*site.glob("sitemap.xml*"), *site.glob("*/*.map")):  # for servers, and for the theme's authors
         file.unlink()

@@ -20,7 +20,8 @@ sys.path.insert(0, str(root / "tests" / "web"))
 import browser
 import pages
 
-MOST_BYTES = 5_000_000
+MOST_BYTES, MOST_INDEX_BYTES = 5_000_000, 1_000_000
+MOST_ROWS = 20  # of README's table of pages; the site has the rest
 NAMES = {"README": "start", "overview": "index"}  # pages of another name on the site
 # What a reader types, and the section that must come among the first three.
 NARROW = 390  # pixels of a phone
@@ -117,8 +118,12 @@ def faults_of_files(site):
     for file in (root / "docs").glob("*.md"):
         if f": {NAMES.get(file.stem, file.stem)}.md\n" not in listed:
             yield f"mkdocs.yml: does not list {file.name}"
-        if not re.search(rf"^\| .*`(docs/)?{re.escape(file.name)}`", (root / "README.md").read_text(), re.M):
-            yield f"README.md: its table of pages lacks {file.name}"
+    rows = re.findall(r"^\| .*\]\(docs/.*\|$", (root / "README.md").read_text(encoding="utf-8"), re.M)
+    if len(rows) > MOST_ROWS:
+        yield f"README.md: its table of pages has {len(rows)} rows, and {MOST_ROWS} are the most"
+    index = (site / "search/index.js").stat().st_size
+    if index >= MOST_INDEX_BYTES:
+        yield f"search/index.js: {index} bytes, and {MOST_INDEX_BYTES} are too many"
 
 
 def faults_of_drawings():
