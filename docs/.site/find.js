@@ -40,7 +40,7 @@
     [/tre(s|d)?$/, 'ter$1'], [/ll(ed|er|ers|ing)$/, 'l$1']];
   const kField = {title: 8, page: 2, text: 1};
   const kSynonym = 0.6, kBegins = 0.5, kLike = 0.4, kPart = 0.25;  // worth beside the word itself; of a term of which words are missing
-  const kLists = /^errors\.html|#(\d+-)?sources$/, kList = 0.2;  // messages and papers repeat every word, and come last
+  const kLists = /#(\d+-)?sources$/, kList = 0.2;  // papers repeat every word, and come last
 
   // One form for both spellings; not a word for readers.
   const spelled = (word) => kEndings.reduce((form, [end, other]) => form.length > 4 ? form.replace(end, other) : form, kSpellings.get(word) ?? word);

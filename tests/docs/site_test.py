@@ -162,9 +162,6 @@ def faults_of_search(site, chromium):
                 page.go((site / "index.html").as_uri() + f"?q={words.replace(' ', '+')}")
                 if not page.until("document.querySelectorAll('#mkdocs-search-results a').length > 3", 10):
                     yield f"search: {words}: finds too little"
-                found = page.evaluate("[...document.querySelectorAll('#mkdocs-search-results a')].map((a) => a.href)")
-                if any("/errors.html" in one for one in found[:3]):
-                    yield f"search: {words}: messages come first: {[one.rsplit('/', 1)[1] for one in found[:3]]}"
             page.go((site / "log.html").as_uri() + "?q=qqqq+wwww")
             if not page.until("document.querySelector('#mkdocs-search-results')?.textContent === 'No results found'", 10):
                 yield "search: does not say that it found nothing"

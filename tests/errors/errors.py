@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""docs/errors.md: what each program says to wrong input, made by giving it that input.
+"""tests/errors/errors.md: what each program says to wrong input, made by giving it that input.
 
 errors.py ROOT BIN check|write|show [WORD]    WORD, of show: only the cases whose title or lines have it
 
@@ -161,12 +161,12 @@ def main():
         wrong += bool(found)
         if found or mode == 'show':
             print(f'{part}: {title}: {lines[-1]}\n    {said}' + ''.join(f'\n    *** {fault}' for fault in found))
-    made, file = page(chosen, ends), root / 'docs/errors.md'
+    made, file = page(chosen, ends), root / 'tests/errors/errors.md'
     if mode == 'write':
         file.write_text(made)
     elif mode == 'check':
         before = ''.join(line for line in file.read_text().splitlines(True) if not any(part in line for part in left_out))
-        sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), 'docs/errors.md', 'now', n=0))
+        sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), 'tests/errors/errors.md', 'now', n=0))
         wrong += before != made
     print(f'errors: {len(chosen)} cases, {wrong} wrong')
     sys.exit(wrong != 0)

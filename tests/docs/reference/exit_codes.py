@@ -33,7 +33,7 @@ def section(root, programs):
     rows.insert(0, ("`./kerf`", "ran, and a check failed; of a demo: a program of it did", "bad input or set-up"))
     return f"""## Exit codes
 
-0: fine. With 2 comes one line on the standard error: location, value, way out ([errors](errors.md)).
+0: fine. With 2 comes one line on the standard error: location, value, way out.
 
 {table(("program", "1", "2"), rows)}
 
