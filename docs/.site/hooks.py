@@ -161,10 +161,10 @@ def on_post_build(config):
     site = pathlib.Path(config["site_dir"])
     search = site / "search"
     found = json.loads((search / "search_index.json").read_text(encoding="utf-8"))["docs"]
-    # A page of its own repeats what its sections have.
+    # A page of its own repeats what its sections have; a heading right above another one leads to nothing.
     pages = {one["location"]: one["title"] for one in found}
     sections = [[one["location"], pages[one["location"].split("#")[0]], one["title"], one["text"]]
-                for one in found if "#" in one["location"]]
+                for one in found if "#" in one["location"] and one["text"].strip()]
     for file in search.iterdir():
         if file.name != "lunr.js":
             file.unlink()
