@@ -15,8 +15,8 @@
     'sampling rate, update rate, servo rate, khz', 'quantization, encoder steps, resolution',
     'controller law, control law, force law', 'haptic rendering, contact force', 'sampling theorem, zero order hold, hold',
     'deformable, deformation, soft tissue, elastic, fem, finite elements', 'docker, container, podman, containerfile',
-    'windows, macos, mac, osx, wsl', 'license, licence, apache, copyright, legal', 'faq, questions and answers',
-    'troubleshooting, troubleshoot, does not work, does not run, problem, what to do, help', 'commercial, sell, price, cost',
+    'windows, macos, mac, osx, wsl', 'license, licence, apache, copyright, legal', 'faq, questions, answers',
+    'troubleshooting, troubleshoot, does not work, does not run, goes wrong, problem, help, bug', 'commercial, sell, price, cost',
     'install, installation, setup, packages', 'supported, compatible, compatibility, works with',
     'unity, unreal, godot, game engine', 'paraview, vtk, blender', 'ros 2, ros2, ros, rosbag, crtk', 'matlab, octave, hdf5',
     'vr, virtual reality, headset, oculus, openxr, webxr', 'stereo, stereoscopic, 3d glasses', 'video, movie, film, mp4, screen recording',
@@ -35,7 +35,7 @@
     'deterministic, determinism, reproducible, same bits', 'log, recording, recorded', 'cite, citation, bibtex, paper', 'api, header, interface',
     'arm64, aarch64, raspberry pi', 'embedded, microcontroller, bare metal, cortex', 'gpu, graphics card, opengl', 'plot, graph, chart', 'rotation, orientation',
   ].map((row) => row.split(', '));
-  // Words of a question that no page is about, beside lunr's own.
+  // Words of a question that say nothing beside others; lunr's own are never counted.
   const kStopWords = ['kerf', 'possible', 'want', 'need', 'try', 'use', 'using', 'work'];
   const kSpellings = new Map(Object.entries({gray: 'grey', licence: 'license', licences: 'licenses', dentine: 'dentin', catalogue: 'catalog'}));
   const kEndings = [[/is(e|es|ed|er|ers|ing|ation|ations)$/, 'iz$1'], [/ys(e|es|ed|er|ers|ing)$/, 'yz$1'], [/our(s|ed|ing|less)?$/, 'or$1'],
@@ -52,10 +52,15 @@
     .flatMap((name) => /[^_]_+[^_]/.test(name) ? [name, ...name.split('_').filter((part) => part)] : [name]);
 
   globalThis.kerfFinder = (lunr, sections) => {
-    const stop = (word) => kStopWords.includes(word) || lunr.stopWordFilter(new lunr.Token(word)) === undefined;
+    const stop = (word) => lunr.stopWordFilter(new lunr.Token(word)) === undefined;
     const stem = (word) => lunr.stemmer(new lunr.Token(spelled(word))).toString();
     const stemsOf = (text) => wordsOf(text).filter((word) => !stop(word)).map(stem);
-    const synonyms = kSynonyms.map((row) => row.map(stemsOf).filter((term) => term.length > 0));
+    const stopStems = kStopWords.map(stem);
+    const wordsOfQuestion = (question) => {
+      const words = stemsOf(question), telling = words.filter((word) => !stopStems.includes(word));
+      return telling.length ? telling : words;
+    };
+    const synonyms = kSynonyms.map((row) => row.map(stemsOf).filter((term) => term.some((word) => !stopStems.includes(word))));
 
     const builder = new lunr.Builder();
     builder.tokenizer = (text) => stemsOf(text).map((one) => new lunr.Token(one));
@@ -113,7 +118,7 @@
     }
 
     const find = (question) => {
-      const terms = termsOf(stemsOf(question));
+      const terms = termsOf(wordsOfQuestion(question));
       const scores = new Map(), met = new Map();
       terms.forEach((term, k) => scoresOfAll(term, k === terms.length - 1).forEach((score, at) => {
         scores.set(at, (scores.get(at) ?? 0) + score);
@@ -125,7 +130,7 @@
     };
     // Where a text has the first of a question's words, for an excerpt.
     find.firstIn = (text, question) => {
-      const wanted = new Set(termsOf(stemsOf(question)).flatMap(({own, others}) => [...own, ...others.flat()]));
+      const wanted = new Set(termsOf(wordsOfQuestion(question)).flatMap(({own, others}) => [...own, ...others.flat()]));
       for (const word of text.matchAll(/[\p{L}\p{N}_]+/gu)) {
         if (wanted.has(stem(word[0].toLowerCase()))) return word.index;
       }
