@@ -30,9 +30,9 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   CommandLine app("Measures kerf without a device.", "kerf-lab", "kerf-lab " KERF_VERSION);
   app.footer("Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.");
   const std::array commands{
-      make_zwidth_command(app),   make_sweep_command(app),  make_faults_command(app),
-      make_accuracy_command(app), make_energy_command(app), make_laws_command(app),
-      make_bench_command(app),
+      make_zwidth_command(app), make_impedance_command(app), make_sweep_command(app),
+      make_faults_command(app), make_accuracy_command(app),  make_energy_command(app),
+      make_laws_command(app),   make_bench_command(app),
   };
   return run_chosen(app, commands, "kerf-lab", argc, argv, out, err);
 }

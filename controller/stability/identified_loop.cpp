@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/stability/identified_loop.hpp"
 
+#include <cstddef>
 #include <optional>
 
 namespace kerf {
@@ -23,14 +24,34 @@ DeviceDirection worst_direction(const IdentifiedDevice& device, double damping_n
   // Half of the neighbours of a cube's middle: the others are the same lines.
   std::optional<DeviceDirection> worst;
   double lowest = 0;
-  for (int code = 14; code < 27; ++code) {
-    const DeviceDirection now =
-        along(device, {double(code / 9 - 1), double(code / 3 % 3 - 1), double(code % 3 - 1)});
+  const auto try_along = [&](const IdentifiedDevice::Axes& direction) {
+    const DeviceDirection now = along(device, direction);
     const double boundary =
         highest_stiffness(loop_along(device, now, rate_hz, false), damping_ns_per_mm);
-    if (worst && !(boundary < lowest)) continue;
+    if (worst && !(boundary < lowest)) return false;
     worst = now;
     lowest = boundary;
+    return true;
+  };
+  for (int code = 14; code < 27; ++code) {
+    try_along({double(code / 9 - 1), double(code / 3 % 3 - 1), double(code % 3 - 1)});
+  }
+  // Two of them are at most 45 degrees apart. A step along x, y or z is one on the sphere, too; the
+  // one along the direction itself leads nowhere.
+  constexpr double kFirstRad = 0.4, kLastRad = 0.001;
+  for (double step = kFirstRad; step > kLastRad; step /= 2) {
+    bool better = true;
+    constexpr int kMostSteps = 8;  // further than to the next of the 13
+    for (int steps = 0; better && steps < kMostSteps; ++steps) {
+      better = false;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (const double side : {-step, step}) {
+          IdentifiedDevice::Axes direction = worst->along;
+          direction[axis] += side;
+          better = try_along(direction) || better;
+        }
+      }
+    }
   }
   return *worst;
 }

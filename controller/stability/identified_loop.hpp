@@ -15,8 +15,8 @@ namespace kerf {
                                      const DeviceDirection& direction, double rate_hz,
                                      bool at_worst);
 
-/// Of the 13 axes and diagonals of a cube that with the lowest exact linear boundary at this
-/// damping and rate. Load time.
+/// The direction with the lowest exact linear boundary at this damping and rate, within 0.1
+/// degrees: searched from the lowest of the 13 axes and diagonals of a cube. Load time.
 [[nodiscard]] DeviceDirection worst_direction(const IdentifiedDevice& device,
                                               double damping_ns_per_mm, double rate_hz);
 

@@ -17,18 +17,27 @@
 namespace kerf {
 namespace {
 
+/// 1 - 1/z at z = e^jw, as 2 j sin(w/2) e^-jw/2: nothing cancels at small w.
+std::complex<double> step_at(double w) {
+  const double sine = std::sin(w / 2);
+  return {2 * sine * sine, 2 * sine * std::cos(w / 2)};
+}
+
+/// H of the wall, N/mm: -F over x, by `step` = 1 - 1/z.
+std::complex<double> law_at(const SampledLoop& loop, double stiffness, double damping,
+                            std::complex<double> step) {
+  const double lag = loop.velocity_filter_s / loop.period_s;
+  return stiffness + damping * (step / (1.0 + lag * step) / loop.period_s);
+}
+
 /// Damping that motion of the angle w needs (docs/theory.md 5.7), at z = e^jw.
 double viscosity_at(const SampledLoop& loop, double stiffness, double damping, double w) {
-  const double lag = loop.velocity_filter_s / loop.period_s;
   const double delay = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
   const double whole = std::floor(delay), part = delay - whole;
-  // 1 - 1/z = 2 j sin(w/2) e^-jw/2 and 1 - cos w = 2 sin^2(w/2): nothing cancels at small w.
-  const double sine = std::sin(w / 2);
-  const std::complex<double> step(2 * sine * sine, 2 * sine * std::cos(w / 2));  // 1 - 1/z
-  const std::complex<double> velocity = step / (1.0 + lag * step) / loop.period_s;
-  const std::complex<double> force = stiffness + damping * velocity;
+  const std::complex<double> step = step_at(w);
+  const std::complex<double> force = law_at(loop, stiffness, damping, step);
   const std::complex<double> mean = std::polar(1.0, -w * whole) * (1.0 - part * step) * force;
-  const double held = (step * mean).real() / (4 * sine * sine);
+  const double held = (step * mean).real() / std::norm(step);  // 2 (1 - cos w) = |1 - 1/z|^2
   return loop.period_s / 2 * (held + std::sqrt(held * held + part * (1 - part) * std::norm(force)));
 }
 
@@ -179,6 +188,25 @@ double first_end(const std::vector<StableBand>& found) {
 }
 
 }  // namespace
+
+std::complex<double> wall_impedance(const SampledLoop& loop, double stiffness_n_per_mm,
+                                    double damping_ns_per_mm, double hz) {
+  const double rad_per_s = 2 * std::numbers::pi * hz, w = rad_per_s * loop.period_s;
+  const double delay_s = std::min(loop.delay_s, kMaxDelayPeriods * loop.period_s);
+  const std::complex<double> step = step_at(w), jw(0, rad_per_s);
+  const std::complex<double> held = step / (jw * loop.period_s);
+  return std::polar(1.0, -rad_per_s * delay_s) * held *
+         law_at(loop, stiffness_n_per_mm, damping_ns_per_mm, step) / jw;
+}
+
+std::complex<double> device_impedance(const SampledLoop& loop, double hz, double amplitude_mm) {
+  constexpr double kMmPerM = 1000;
+  const double rad_per_s = 2 * std::numbers::pi * hz;
+  // The fundamental of a force of alternating sign is 4/pi of it.
+  const double sliding =
+      loop.coulomb_n > 0 ? 4 * loop.coulomb_n / (std::numbers::pi * rad_per_s * amplitude_mm) : 0;
+  return {loop.viscous_ns_per_mm + sliding, rad_per_s * loop.mass_kg / kMmPerM};
+}
 
 double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
                          double damping_ns_per_mm) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "shared/numeric/fnv1a.hpp"
+#include "shared/numeric/quick_elementary.hpp"
 
 namespace kerf {
 namespace {
@@ -44,8 +45,14 @@ HandGoal Emulator::next_goal() noexcept {
     hand_->rest();
   }
   if (!hand_->left()) guide_hand();
-  const HandGoal goal = hand_->next();
-  return led_ && accepts_target() ? led_->next(goal, model_->tip_mm()) : goal;
+  HandGoal goal = hand_->next();
+  if (!accepts_target()) return goal;
+  if (led_) goal = led_->next(goal, model_->tip_mm());
+  if (!shake_) return goal;
+  const double angle = shake_->rad_per_cycle * static_cast<double>(++shaken_);
+  goal.target_mm = goal.target_mm + shake_->cosine_mm * quick::cosine(angle) +
+                   shake_->sine_mm * quick::sine(angle);
+  return goal;
 }
 
 void Emulator::advance(int cycles) noexcept {

@@ -85,6 +85,13 @@ struct EmulatorStats {
   std::uint64_t report_hash = kFnv1aBasis;  ///< FNV-1a of all handed-out bytes
 };
 
+/// A sine that a hand adds to the last point of its script, from its first cycle on: its value in
+/// cycle n is cosine cos(n w) + sine sin(n w), device mm.
+struct HandShake {
+  DeviceVec<double> cosine_mm, sine_mm;
+  double rad_per_cycle = 0;
+};
+
 /// A device and its hand behind packets: no clock, no socket, so a front in real time, one in
 /// lock-step and a test run the same code.
 ///
@@ -118,6 +125,11 @@ class Emulator final : public PacketDevice {
   void set_target(const HandTarget& target) noexcept;
   void release() noexcept;
 
+  /// Once the script has ended the hand shakes, whoever leads it.
+  void shake(const HandShake& by) noexcept { shake_ = by; }
+  /// Cycles of this motion so far: the last one was n of `HandShake`.
+  [[nodiscard]] std::int64_t shaken_cycles() const noexcept { return shaken_; }
+
   [[nodiscard]] const EmulatorStats& stats() const noexcept { return stats_; }
   [[nodiscard]] const DeviceModel& model() const noexcept { return *model_; }
 
@@ -128,6 +140,8 @@ class Emulator final : public PacketDevice {
   std::unique_ptr<DeviceModel> model_;
   std::optional<HandMotion> hand_;
   std::optional<GuidedHand> led_;
+  std::optional<HandShake> shake_;
+  std::int64_t shaken_ = 0;
   EmulatorStats stats_;
   bool asked_ = false;                      ///< for a packet, since the last `advance`
   std::optional<std::int64_t> host_since_;  ///< cycle of the first packet, of either side

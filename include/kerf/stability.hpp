@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -103,6 +104,20 @@ inline constexpr double kMaxDelayPeriods = 64;
 /// The largest B (N s/mm) that is stable without any stiffness (K -> 0): no wall may have more.
 [[nodiscard]] double highest_damping(const SampledLoop& loop);
 
+// What a hand feels that moves the tip as a sine (docs/theory.md 5.8): force over velocity, N s/mm,
+// of the fundamental. Re Z is the damping that it feels, -w Im Z the stiffness. Of a linear wall,
+// up to half of the servo's rate.
+
+/// Of the rendered wall, with hold, delay and filter. Device, hand and encoder steps do not count.
+[[nodiscard]] std::complex<double> wall_impedance(const SampledLoop& loop,
+                                                  double stiffness_n_per_mm,
+                                                  double damping_ns_per_mm, double hz);
+
+/// Of the device without a wall: its mass, its damping, and its Coulomb friction in a motion of
+/// this amplitude. At the port a hand feels the sum of both.
+[[nodiscard]] std::complex<double> device_impedance(const SampledLoop& loop, double hz,
+                                                    double amplitude_mm);
+
 // Runs.
 
 /// The verdict on a run. A run with none of the four flags is proven to be at rest.
@@ -199,7 +214,7 @@ struct MapOptions {
   /// Ends the map when another thread sets it: columns that are not done then have no cells.
   const std::atomic<bool>* stop = nullptr;
   /// Of a device that is a file: "x", "y", "z", such as "1,0,1", or "worst", as if empty, the one
-  /// of 13 with the lowest boundary.
+  /// with the lowest linear boundary.
   std::string direction{};
 };
 

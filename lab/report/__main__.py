@@ -25,6 +25,7 @@ KINDS = {
     ("pictures", "page"): False, ("pictures", "summary"): False, ("pictures", "tables"): False,
     ("accuracy", "page"): False, ("accuracy", "plot"): True,
     ("contact", "page"): False, ("contact", "plot"): True, ("contact", "hands"): True,
+    ("impedance", "plot"): True,
     ("stability", "measure"): False, ("stability", "page"): False, ("stability", "devices"): True,
     ("stability", "rates"): True,
     ("stability_map", "map"): True, ("stability_map", "portraits"): True,

@@ -43,6 +43,7 @@ class LabCommand {
 [[nodiscard]] std::unique_ptr<LabCommand> make_bench_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_energy_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_faults_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_impedance_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_laws_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_sweep_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_zwidth_command(Arguments& program);

@@ -22,7 +22,7 @@
 namespace kerf::zwidth {
 namespace {
 
-constexpr double kRadiusMm = 1, kVoxelMm = 0.25;
+constexpr double kRadiusMm = kArmTouchMm, kVoxelMm = 0.25;
 constexpr double kAwayMm = 3;     ///< the tool's middle above the flat, before a hit
 constexpr double kGentlyS = 0.4;  ///< from there into the wall, of a push
 /// x and z at which two more walls meet the flat: away from the hand's way in, which comes from -z,
@@ -55,11 +55,6 @@ Params with_plant(Params params, const LoopCase& subject) {
     params.mode_hz = subject.mode_hz;
   }
   return params;
-}
-
-std::unique_ptr<DeviceModel> model_of(const LoopCase& subject) {
-  return with_device_params(
-      subject.device, [&](const auto& params) { return make_model(with_plant(params, subject)); });
 }
 
 /// One way of meeting a wall; device mm, of the tool's middle. Judged along `normal`.
@@ -115,7 +110,7 @@ HandScript script_of(const LoopCase& subject, const ArmHit& hit) {
 class Rig {
  public:
   Rig(LoadedScene scene, const LoopCase& subject, const HandScript& hand)
-      : emulator_(model_of(subject), hand), port_(emulator_), loop_(scene, port_) {
+      : emulator_(arm_model(subject), hand), port_(emulator_), loop_(scene, port_) {
     loop_.driver().allow_stillness();
   }
 
@@ -170,19 +165,6 @@ LimitCycle watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit, doubl
   }
 }
 
-/// The scene of one cell.
-LoadedScene cell_scene(const LoadedScene& scene, const LoopCase& subject,
-                       double stiffness_n_per_mm) {
-  LoadedScene own = scene;
-  own.force.stiffness_n_per_mm = stiffness_n_per_mm;
-  if (subject.law == Law::paper) {
-    own.force.p0_n_per_mm2 = 1;
-    own.force.p0_n_per_mm2 = stiffness_n_per_mm / device_stiffness_n_per_mm(own);
-  }
-  own.force.law = force_law_at(subject, stiffness_n_per_mm);
-  return own;
-}
-
 }  // namespace
 
 LoadedScene walls_scene(const LoopCase& subject) {
@@ -219,6 +201,23 @@ LoadedScene walls_scene(const LoopCase& subject) {
   return scene;
 }
 
+std::unique_ptr<DeviceModel> arm_model(const LoopCase& subject) {
+  return with_device_params(
+      subject.device, [&](const auto& params) { return make_model(with_plant(params, subject)); });
+}
+
+LoadedScene arm_scene(const LoadedScene& walls, const LoopCase& subject,
+                      double stiffness_n_per_mm) {
+  LoadedScene own = walls;
+  own.force.stiffness_n_per_mm = stiffness_n_per_mm;
+  if (subject.law == Law::paper) {
+    own.force.p0_n_per_mm2 = 1;
+    own.force.p0_n_per_mm2 = stiffness_n_per_mm / device_stiffness_n_per_mm(own);
+  }
+  own.force.law = force_law_at(subject, stiffness_n_per_mm);
+  return own;
+}
+
 LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
                         double stiffness_n_per_mm, std::size_t hit, const Press& press,
                         double limit_s, std::uint64_t seed, StepCounter& ticks,
@@ -226,7 +225,7 @@ LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
   // A tip that friction holds does not move before the hand has come to its place.
   constexpr double kRememberedS = 2 * kGentlyS;
   const ArmHit way = hits_of(subject, press, seed)[hit];
-  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject, script_of(subject, way));
+  Rig rig(arm_scene(scene, subject, stiffness_n_per_mm), subject, script_of(subject, way));
   return watch_hit(rig, subject, way, press.push_n,
                    hit_ticks(subject, stiffness_n_per_mm, press, limit_s, kRememberedS), ticks,
                    watch);

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/stability/limit_cycle.hpp"
+#include "hil/device/device_model.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/stability/axes.hpp"
 #include "lab/stability/tick_watch.hpp"
@@ -21,6 +23,16 @@ inline constexpr std::size_t kArmPress = 5;
 /// not cut, for the subject's device. Throws HilError for a rate that does not divide that of the
 /// devices' mechanics.
 [[nodiscard]] LoadedScene walls_scene(const LoopCase& subject);
+
+/// That scene with this stiffness of the wall, by the subject's law.
+[[nodiscard]] LoadedScene arm_scene(const LoadedScene& walls, const LoopCase& subject,
+                                    double stiffness_n_per_mm);
+
+/// The emulated device of the subject, with its hand: a spring of 0.2 N/mm if it has none.
+[[nodiscard]] std::unique_ptr<DeviceModel> arm_model(const LoopCase& subject);
+
+/// y of the tool's middle in that scene when it touches the flat, mm.
+inline constexpr double kArmTouchMm = 1;
 
 /// Nothing was measured: within 8 s the hand did not bring the device to the wall, by too much
 /// friction, mass or damping.

@@ -275,14 +275,13 @@ double seven_digits(double value) {
   return *number_in(format("%.7g", value));
 }
 
-std::vector<double> stiffness_values(const std::string& text) {
-  constexpr double kLowest = 1e-4, kHighest = 127;  // N/mm: steps of fixed point; below its 128
+std::vector<double> ratio_values(const RatioOption& option, const std::string& text) {
   std::vector<double> values;
   const auto refuse = [&](const std::string& what) {
-    throw HilError("--stiffness: " + text + ": " + what +
-                   "; use such as 0.05:50:40 (from, to, count) or 0.5,1,2");
+    throw HilError("--" + std::string(option.name) + ": " + text + ": " + what + "; use such as " +
+                   option.example);
   };
-  if (const auto range = ordered_range("stiffness", text)) {
+  if (const auto range = ordered_range(option.name, text)) {
     if (range->lo <= 0) refuse("its ends are not above 0");
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
@@ -297,14 +296,21 @@ std::vector<double> stiffness_values(const std::string& text) {
   }
   if (values.empty()) refuse("no value");
   std::ranges::sort(values);
-  if (!(values.front() >= kLowest && values.back() <= kHighest)) {
-    refuse("not within 0.0001 and 127 N/mm");
+  if (!(values.front() >= option.lowest && values.back() <= option.highest)) {
+    refuse("not within " + number_text(option.lowest) + " and " + number_text(option.highest) +
+           " " + option.unit);
   }
   for (double& value : values) value = seven_digits(value);
   if (std::ranges::adjacent_find(values) != values.end()) {
     refuse("a value twice, to seven digits");
   }
   return values;
+}
+
+std::vector<double> stiffness_values(const std::string& text) {
+  // N/mm: steps of fixed point; below its 128
+  return ratio_values({"stiffness", "0.05:50:40 (from, to, count) or 0.5,1,2", "N/mm", 1e-4, 127},
+                      text);
 }
 
 std::vector<Assignment> combinations(const AxisTable& table) {
@@ -321,6 +327,15 @@ std::vector<Assignment> combinations(const AxisTable& table) {
     all = std::move(next);
   }
   return all;
+}
+
+void check_filter(const Assignment& values) {
+  const std::string estimator = value_of(values, AxisId::estimator);
+  if (value_of(values, AxisId::filter) == "0" || estimator == "difference") return;
+  throw HilError("--filter: " + estimator +
+                 (estimator.starts_with("difference/")
+                      ? " sets its low-pass itself; leave one of the two out"
+                      : " has no low-pass behind it; add --estimator difference, or leave it out"));
 }
 
 std::string value_of(const Assignment& values, AxisId axis) {

@@ -110,6 +110,15 @@ using Assignment = std::array<std::string, kAxisCount>;
 /// HilError with one line, also for a value twice.
 [[nodiscard]] std::vector<double> stiffness_values(const std::string& text);
 
+/// Such a text of another option, whose values have other limits.
+struct RatioOption {
+  const char* name;     ///< without dashes
+  const char* example;  ///< of a range and of a list, with what they mean
+  const char* unit;
+  double lowest, highest;
+};
+[[nodiscard]] std::vector<double> ratio_values(const RatioOption& option, const std::string& text);
+
 /// To seven digits: the same text, and so the same number, with every libm.
 [[nodiscard]] double seven_digits(double value);
 
@@ -118,6 +127,9 @@ using Assignment = std::array<std::string, kAxisCount>;
 
 /// The subject of these values, with the standards of their loop and device.
 [[nodiscard]] LoopCase subject_of(const Assignment& values);
+
+/// Throws HilError for a low-pass with an estimator that has none behind it.
+void check_filter(const Assignment& values);
 
 /// The value in force, given or standard, as in the files of a map.
 [[nodiscard]] std::string value_of(const Assignment& values, AxisId axis);

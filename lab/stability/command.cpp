@@ -139,8 +139,6 @@ class ZwidthCommand final : public LabCommand {
 
  private:
   [[nodiscard]] MapSpec spec(std::ostream& out) const;
-  /// The axes as given; of a file behind --device its own values for those that are not.
-  [[nodiscard]] std::array<std::string, kAxisCount> axis_texts(std::ostream& out) const;
   static void try_laws(const MapSpec& map, std::ostream& out);
   [[nodiscard]] Shard shard() const;
   /// The columns of the shard that `kept` has not; false: interrupted.
@@ -302,50 +300,12 @@ void check_laws(const MapSpec& spec) {
   }
 }
 
-/// Throws HilError for a low-pass with an estimator that has none behind it.
-void check_filters(const MapSpec& spec) {
-  for (const Assignment& values : spec.columns()) {
-    const std::string estimator = value_of(values, AxisId::estimator);
-    if (value_of(values, AxisId::filter) == "0" || estimator == "difference") continue;
-    throw HilError(
-        "--filter: " + estimator +
-        (estimator.starts_with("difference/")
-             ? " sets its low-pass itself; leave one of the two out"
-             : " has no low-pass behind it; add --estimator difference, or leave it out"));
-  }
-}
-
-std::array<std::string, kAxisCount> ZwidthCommand::axis_texts(std::ostream& out) const {
-  std::array<std::string, kAxisCount> texts = axes_;
-  std::string& device = texts[index_of(AxisId::device)];
-  if (!device.ends_with(".toml")) {
-    if (direction_.empty() && device.find(".toml") == std::string::npos) return texts;
-    if (direction_.empty()) throw HilError("--device: " + device + ": give one file alone");
-    throw HilError(
-        "--direction: is that of a file behind --device; give such as --device "
-        "device.toml, or leave it out");
-  }
-  if (device.find(',') != std::string::npos) {
-    throw HilError("--device: " + device + ": give one file alone");
-  }
-  if (arm_) {
-    throw HilError("--device: " + device +
-                   ": the whole arm is an emulated one; leave --arm out, or name its device");
-  }
-  const DeviceDirection found =
-      take_device(device, direction_.empty() ? "worst" : direction_, texts);
-  out << format("%s along %.3g, %.3g, %.3g: %.4g kg, %.4g N s/mm, friction %.4g N\n",
-                device.c_str(), found.along[0], found.along[1], found.along[2], found.mass_kg,
-                found.viscous_ns_per_mm, found.coulomb_n);
-  device.clear();
-  return texts;
-}
-
 MapSpec ZwidthCommand::spec(std::ostream& out) const {
   MapSpec spec;
   spec.mapped = mapped_axes(map_);
   spec.arm = arm_;
-  std::array<std::string, kAxisCount> texts = axis_texts(out);
+  std::array<std::string, kAxisCount> texts = axes_;
+  take_device_option(direction_, arm_, texts, out);
   for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
     if (!arm_ || texts[index_of(axis)].empty()) continue;
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
@@ -379,7 +339,7 @@ MapSpec ZwidthCommand::spec(std::ostream& out) const {
   spec.stiffness_n_per_mm = stiffness_values(!stiffness_.empty() ? stiffness_
                                              : quick_            ? "0.05:50:25"
                                                                  : "0.05:50:40");
-  check_filters(spec);
+  for (const Assignment& values : spec.columns()) check_filter(values);
   // No verdict depends on a shorter limit: the run that decides it is always followed.
   constexpr double kCurveS = 3;
   spec.seconds = portraits_.empty() ? std::max(seconds_, kLimitS)

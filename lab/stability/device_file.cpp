@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <ostream>
 #include <string_view>
 
 #include "controller/stability/identified_loop.hpp"
@@ -67,9 +68,11 @@ DeviceDirection take_device(const std::string& file, const std::string& directio
     throw HilError("--rate: " + texts[index_of(AxisId::rate)] + ": the delay of " + file +
                    " is a time, so the map has one rate; give one");
   }
-  // The damping of a map is a range as a rule; the direction is that at the standard one.
-  const double damping = number_in(axis_kinds()[index_of(AxisId::damping)].standard).value_or(0);
-  const DeviceDirection found = direction_of(device, direction, damping, *rate_hz);
+  // The damping of a map is a range as a rule; the direction is then that at the standard one.
+  const char* const standard = axis_kinds()[index_of(AxisId::damping)].standard;
+  const auto damping = number_in(texts[index_of(AxisId::damping)]);
+  const DeviceDirection found =
+      direction_of(device, direction, damping.value_or(number_in(standard).value_or(0)), *rate_hz);
   const auto fill = [&](AxisId axis, double value) {
     std::string& text = texts[index_of(axis)];
     if (text.empty()) text = format("%.6g", value);
@@ -80,6 +83,30 @@ DeviceDirection take_device(const std::string& file, const std::string& directio
   fill(AxisId::quantum, found.quantum_mm);
   fill(AxisId::delay, device.delay_s * *rate_hz);
   return found;
+}
+
+void take_device_option(const std::string& direction, bool arm,
+                        std::array<std::string, kAxisCount>& texts, std::ostream& out) {
+  std::string& device = texts[index_of(AxisId::device)];
+  if (!device.ends_with(".toml")) {
+    if (direction.empty() && device.find(".toml") == std::string::npos) return;
+    if (direction.empty()) throw HilError("--device: " + device + ": give one file alone");
+    throw HilError(
+        "--direction: is that of a file behind --device; give such as --device "
+        "device.toml, or leave it out");
+  }
+  if (device.find(',') != std::string::npos) {
+    throw HilError("--device: " + device + ": give one file alone");
+  }
+  if (arm) {
+    throw HilError("--device: " + device +
+                   ": the whole arm is an emulated one; leave --arm out, or name its device");
+  }
+  const DeviceDirection found = take_device(device, direction.empty() ? "worst" : direction, texts);
+  out << format("%s along %.3g, %.3g, %.3g: %.4g kg, %.4g N s/mm, friction %.4g N\n",
+                device.c_str(), found.along[0], found.along[1], found.along[2], found.mass_kg,
+                found.viscous_ns_per_mm, found.coulomb_n);
+  device.clear();
 }
 
 }  // namespace kerf::zwidth

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <iosfwd>
 #include <string>
 
 #include "lab/stability/axes.hpp"
@@ -19,5 +20,11 @@ namespace kerf::zwidth {
 /// axis that the delay in periods needs, the rate, or none. Throws HilError.
 [[nodiscard]] DeviceDirection take_device(const std::string& file, const std::string& direction,
                                           std::array<std::string, kAxisCount>& texts);
+
+/// If `texts` have a file behind --device, puts its axes there in place of its name, as
+/// `take_device`, and prints one line about them. `direction`: of --direction, empty: worst. Throws
+/// HilError, also for a direction without a file, and for the whole arm (`arm`), which is emulated.
+void take_device_option(const std::string& direction, bool arm,
+                        std::array<std::string, kAxisCount>& texts, std::ostream& out);
 
 }  // namespace kerf::zwidth

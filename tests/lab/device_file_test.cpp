@@ -2,11 +2,13 @@
 #include "lab/stability/device_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
 #include <doctest/doctest.h>
 
+#include "controller/stability/identified_loop.hpp"
 #include "shared/text/text.hpp"
 #include "tests/lab/lab_line.hpp"
 #include "tests/support/identified_device.hpp"
@@ -75,6 +77,40 @@ TEST_CASE("the worst direction has the lowest boundary of all that are tried") {
   for (const char* other : {"x", "y", "z", "1,1,0", "1,0,-1", "1,-1,1"}) {
     CHECK(worst <= boundary(direction_of(device, other, 0.002, 1000)));
   }
+}
+
+TEST_CASE(
+    "the worst direction is lower than any of two thousand, of an arm that is light across its "
+    "axes") {
+  const TemporaryFolder folder;
+  // Its lightest direction, 0.35, 0.85, 0.4, is 23 degrees from each axis and diagonal of a cube.
+  const IdentifiedDevice device = read_identified_device(folder.write(
+      "device.toml", device_file_with("0.032, 0.053, 0.077, 0.01, -0.022, 0.005",
+                                      "0.0909, 0.0461, 0.0881, -0.0222, -0.0104, -0.0254")));
+  const auto boundary = [&](const kerf::DeviceDirection& at) {
+    return kerf::highest_stiffness(kerf::loop_along(device, at, 1000, false), 0.003);
+  };
+  const auto worst = direction_of(device, "worst", 0.003, 1000);
+  const double lowest = boundary(worst);
+  // The same even spread of a sphere on every machine (Fibonacci's lattice).
+  constexpr int kCount = 2000;
+  for (int i = 0; i < kCount; ++i) {
+    const double z = 1 - (2 * i + 1.0) / kCount, angle = i * 2.399963229728653;
+    const double across = std::sqrt(1 - z * z);
+    const auto other = along(device, {across * std::cos(angle), across * std::sin(angle), z});
+    CHECK(lowest <= boundary(other));
+  }
+}
+
+TEST_CASE("the worst direction is that at the damping of the map") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("device.toml", kDeviceFile);
+  std::array<std::string, kerf::zwidth::kAxisCount> texts;
+  texts[kerf::zwidth::index_of(kerf::zwidth::AxisId::damping)] = "0.02";
+  const auto found = kerf::zwidth::take_device(file, "worst", texts);
+  const auto worst = direction_of(read_identified_device(file), "worst", 0.02, 1000);
+  CHECK(found.along == worst.along);
+  CHECK(found.along != direction_of(read_identified_device(file), "worst", 0.002, 1000).along);
 }
 
 TEST_CASE("a map of a file is that of its figures as options") {

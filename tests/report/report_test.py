@@ -117,6 +117,7 @@ ACCURACY = {"provenance": "a day, a machine.", "rows": accuracy_rows()}
 MAP = lab("zwidth", "--damping", "0:0.03:3", "--rate", "500,1000", "--stiffness", "0.05:50:6", "--seeds", "1")
 HEIGHTS = lab("zwidth", "--map", "numeric,rate", "--numeric", "fixed,double", "--rate", "500,1000", "--damping", "0.002",
               "--stiffness", "0.05:50:5", "--seeds", "1")
+FELT = lab("impedance", "--frequency", "1:250:5")
 PORTRAITS = {"seed": 1, "seconds": 1, "whole_arm": False, "axes": MAP["columns"][0]["axes"],
              "cells": [{"stiffness_n_per_mm": 1, "damping_ns_per_mm": 0.002,
                         "hits": [{"name": "push", "tip_mm": [0, -1], "mm_per_s": [0, 1]}]}]}
@@ -155,6 +156,7 @@ PLOTS = [
     (("contact", "plot"), CONTACT, [], ["slow press into a wall", "proxy: not up to here"], "comparison"),
     (("contact", "hands"), CONTACT, [], ["touch: force (N)", "touch: removed (mm³)"], "hands"),
     (("accuracy", "plot"), ACCURACY, [], ["force against theory", ">front<"], "rows"),
+    (("impedance", "plot"), FELT, [], ["damping as felt (N s/mm)", "device and wall, measured"], "rows"),
     (("stability_map", "map"), MAP, [], ["rate 500 Hz", "stiffness of the wall, K (N/mm)", "comes to rest"], "columns"),
     (("stability_map", "map"), HEIGHTS, [], ["highest stiffness, by the stricter rule (N/mm)"], "columns"),
     (("stability_map", "portraits"), PORTRAITS, [], ["K 1 N/mm, B 0.002 N s/mm", ">push<"], "cells"),

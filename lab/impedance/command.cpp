@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "controller/law/registry/law_registry.hpp"
+#include "hil/hil_error.hpp"
+#include "lab/impedance/shaken_arm.hpp"
+#include "lab/impedance/spectrum.hpp"
+#include "lab/run/lab_command.hpp"
+#include "lab/run/lab_run.hpp"
+#include "lab/stability/arm.hpp"
+#include "lab/stability/axes.hpp"
+#include "lab/stability/device_file.hpp"
+#include "lab/stability/map.hpp"
+#include "shared/posix/report_tool.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf::impedance {
+namespace {
+
+using zwidth::AxisId;
+
+/// The axes of a map that a wall and a device over frequency have.
+constexpr std::array kAxes{AxisId::loop,  AxisId::device,     AxisId::damping,  AxisId::rate,
+                           AxisId::delay, AxisId::quantum,    AxisId::friction, AxisId::viscous,
+                           AxisId::mass,  AxisId::estimator,  AxisId::filter,   AxisId::numeric,
+                           AxisId::law,   AxisId::stabiliser, AxisId::limits};
+
+/// `kerf-lab impedance`: what a hand feels of a wall over frequency, by theory and from motion.
+class ImpedanceCommand final : public LabCommand {
+ public:
+  explicit ImpedanceCommand(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  /// The wall and its device, nothing measured yet.
+  [[nodiscard]] Spectrum subject(std::ostream& out) const;
+  [[nodiscard]] std::vector<double> frequencies(double rate_hz) const;
+
+  std::array<std::string, zwidth::kAxisCount> axes_, option_names_;
+  std::string direction_, frequency_, json_, plot_;
+  double stiffness_ = 1, amplitude_ = 0.5;
+  bool arm_ = false;
+};
+
+ImpedanceCommand::ImpedanceCommand(Arguments& program)
+    : LabCommand(program, "impedance",
+                 "which stiffness and damping a hand feels, over frequency, beside the theory") {
+  for (const AxisId axis : kAxes) {
+    const std::size_t i = zwidth::index_of(axis);
+    const zwidth::AxisKind& kind = zwidth::axis_kinds()[i];
+    std::string meaning = kind.meaning;
+    if (*kind.standard != 0) meaning += std::string(" [") + kind.standard + "]";
+    option_names_[i] = std::string("--") + kind.name;  // the option keeps only a pointer
+    app_.option(option_names_[i].c_str(), axes_[i], meaning)
+        .shown_as(*kind.unit != 0 ? kind.unit : "VALUE");
+  }
+  app_.option("--direction", direction_,
+              "of a --device that is a file of kerf identify: x, y, z, such as 1,0,1, or worst "
+              "[worst]")
+      .shown_as("N");
+  app_.option("--stiffness", stiffness_, "of the wall, K, N/mm").within(1e-4, 127).shows_default();
+  app_.option("--frequency", frequency_,
+              "of the motion: from:to:count, even in their ratio, or a list [1 to half of the "
+              "Nyquist frequency, 25]")
+      .shown_as("Hz");
+  app_.option("--amplitude", amplitude_,
+              "of the motion, mm, or less as far as the limits of the force need")
+      .within(kLeastMm, 10)
+      .shows_default();
+  app_.flag("--arm", arm_,
+            "the whole servo step with an emulated device in a stiff hand in place of one axis");
+  app_.option("--json", json_, "write axes, margins and a row for each frequency").shown_as("FILE");
+  app_.option("--plot", plot_, "draw stiffness and damping over frequency (SVG)").shown_as("FILE");
+  app_.footer(
+      "Each option has one value. K and B felt are -w Im Z and Re Z of the force over the velocity "
+      "of a\ntip that moves as a sine in the wall; docs/theory.md 5.8.\n"
+      "Exit codes: 0 fine, 2 bad input or set-up.");
+}
+
+Spectrum ImpedanceCommand::subject(std::ostream& out) const {
+  std::array<std::string, zwidth::kAxisCount> texts = axes_;
+  zwidth::take_device_option(direction_, arm_, texts, out);
+  Spectrum spectrum;
+  for (const AxisId axis : kAxes) {
+    const std::size_t i = zwidth::index_of(axis);
+    if (texts[i].empty()) continue;
+    const zwidth::AxisValues values = zwidth::axis_values(axis, texts[i]);
+    if (values.size() > 1) {
+      throw HilError(std::string("--") + zwidth::axis_kinds()[i].name + ": " + texts[i] +
+                     ": one wall has one value; give one");
+    }
+    spectrum.values[i] = values.front();
+  }
+  if (zwidth::value_of(spectrum.values, AxisId::law) == "paper") {
+    throw HilError("--law: paper is a force of the whole arm; give another one");
+  }
+  if (arm_) {
+    for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
+      if (axes_[zwidth::index_of(axis)].empty()) continue;
+      throw HilError(std::string("--") + zwidth::axis_kinds()[zwidth::index_of(axis)].name +
+                     ": device and servo have their own with --arm; leave one of the two out");
+    }
+  }
+  zwidth::check_filter(spectrum.values);
+  spectrum.subject = zwidth::subject_of(spectrum.values);
+  spectrum.stiffness_n_per_mm = stiffness_;
+  return spectrum;
+}
+
+/// Throws HilError for a rate or a delay that no emulated device has.
+LoadedScene walls_of(const Spectrum& spectrum) {
+  LoadedScene walls = zwidth::walls_scene(spectrum.subject);
+  zwidth::MapSpec map;
+  map.arm = true;
+  map.stiffness_n_per_mm = {spectrum.stiffness_n_per_mm};
+  const std::string why = zwidth::impossible(map, spectrum.subject);
+  if (!why.empty()) throw HilError("--arm: " + why);
+  return walls;
+}
+
+std::vector<double> ImpedanceCommand::frequencies(double rate_hz) const {
+  // Nearer to the Nyquist frequency a sine and its alias are no longer two.
+  constexpr double kMostPart = 0.4, kLeastHz = 0.1;
+  return zwidth::ratio_values(
+      {"frequency", "1:250:25 (from, to, count) or 1,30,250", "Hz", kLeastHz, kMostPart * rate_hz},
+      frequency_.empty() ? format("1:%g:25", rate_hz / 4) : frequency_);
+}
+
+int ImpedanceCommand::run(std::ostream& out) const {
+  const LabOutput as_json("--json", json_, ".json"), as_plot("--plot", plot_, ".svg");
+  LabOutput::check_distinct({&as_json, &as_plot});
+  if (!plot_.empty()) check_can_plot();
+  Spectrum spectrum = subject(out);
+  const double rate_hz = 1 / spectrum.subject.loop.period_s;
+  const std::optional<LoadedScene> walls = arm_ ? std::optional(walls_of(spectrum)) : std::nullopt;
+  for (const double hz : frequencies(rate_hz)) {
+    try {
+      spectrum.rows.push_back(
+          walls
+              ? measure_arm(*walls, spectrum.subject, stiffness_, hz, amplitude_)
+              : measure_one_axis(spectrum.subject, stiffness_, sine_near(hz, rate_hz), amplitude_));
+    } catch (const LawError& error) {
+      throw HilError("--law: " + spectrum.subject.force_law.name + error.what());
+    }
+  }
+  if (std::ranges::none_of(spectrum.rows, [](const auto& row) { return row.wall.has_value(); })) {
+    throw HilError("--limits: peak and slew of the force leave no motion at " +
+                   number_text(stiffness_) +
+                   " N/mm; add --limits off, or give less stiffness or damping");
+  }
+  out << text_of(spectrum);
+  const std::string json = json_of(spectrum);
+  as_json.write(json);
+  as_plot.write_report({"impedance", "plot"}, json, out);
+  return 0;
+}
+
+}  // namespace
+}  // namespace kerf::impedance
+
+std::unique_ptr<kerf::LabCommand> kerf::make_impedance_command(Arguments& program) {
+  return std::make_unique<impedance::ImpedanceCommand>(program);
+}
