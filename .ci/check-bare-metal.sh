@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The golden run on an Arm Cortex-M7 without an operating system (examples/bare-metal, docs/bare-metal.md), under QEMU: its
+# The golden run on an Arm Cortex-M7 without an operating system (examples/bare-metal, docs/determinism.md), under QEMU: its
 # bits, its stack against the bound from the compiler's figures, that there is no heap, and that a stack too small is seen.
 # Prints the lines of each image. Exit code 77: a compiler or QEMU is missing.
 #     .ci/check-bare-metal.sh [--compile]      --compile: only whether that compiler takes the core; 10 s
@@ -62,7 +62,7 @@ for scene in $scenes; do
   began=$SECONDS status=0
   said=$(run "$scene") || status=$?
   sed "1s/\$/ $((SECONDS - began))/" <<<"$said"
-  ((status == 0)) || fail "$scene ended with exit code $status; docs/bare-metal.md says what each means"
+  ((status == 0)) || fail "$scene ended with exit code $status; docs/determinism.md says what each means"
   heap=$(arm-none-eabi-nm "$images/bin/$scene.elf" | grep -E ' (_*(malloc|calloc|realloc|free|sbrk)(_r)?|_Zn[wa].*|_Zd[la].*|__cxa_.*)$' || true)
   [[ -z $heap ]] || fail "$scene has a heap or exceptions: $heap"
   bound=$(examples/bare-metal/stack_bound.py "${graphs[@]}" "$images/examples/bare-metal/CMakeFiles/$scene.dir/run.cpp.ci")

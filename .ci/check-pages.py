@@ -3,12 +3,12 @@
 """Whether the pages that a command makes are older than the sources that make them:
 
     .ci/check-pages.py                  prints each stale page with the command that renews it; exit code 1 if there is one
-    .ci/check-pages.py --stamp PAGE...  after a page was made anew: writes the hash of its sources as its last line; also if
-                                        no change of them can move a figure, and the commit says why
+    .ci/check-pages.py --stamp PAGE...  after a page was made anew: writes the hash of its sources behind it; also if no change
+                                        of them can move a figure, and the commit says why. PAGE#PART: of this part alone
 
-A page ends with <!-- made by: COMMAND; sources: HASH -->. The hash is over the code of the sources, without their paths and
-comments: neither a renamed file nor another comment makes a page stale. Pages that a test makes again and compares
-(scene-keys, script-keys, reports, segment, wire, log, errors) need no hash."""
+A page ends with a line <!-- made by: COMMAND; sources: HASH --> for each command that makes a part of it. The hash is over the
+code of the sources, without their paths and comments: neither a renamed file nor another comment makes a page stale. Pages
+that a test makes again and compares (scene-keys, script-keys, reports, segment, wire, log) need no hash."""
 import hashlib
 import io
 import pathlib
@@ -18,7 +18,7 @@ import tokenize
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RIG = ["lab/rig/*"]
-# Page, the command that makes it, the sources of its rows and texts.
+# Page, or page#part, the command that makes it, the sources of its rows and texts.
 PAGES = {
     "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py"]),
     "docs/contact.md": ("./kerf studies extremes --data DIR --page docs/contact.md",
@@ -26,14 +26,14 @@ PAGES = {
     "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*", "lab/report/energy.py", "lab/rig/port_loop.hpp", "controller/law/*"]),
     "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
                           ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*", "lab/report/stability*"]),
-    "docs/performance.md": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", "lab/report/kernels.py", *RIG]),
-    "docs/pictures.md": ("./kerf bench pictures --page docs/pictures.md", ["visualizer/bench/*", "lab/report/pictures.py"]),
-    "docs/second-machine.md": ("./kerf bench bridge --page docs/second-machine.md", ["tests/studies/bridge/*"]),
+    "docs/performance.md#kernels": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", "lab/report/kernels.py", *RIG]),
+    "docs/performance.md#pictures": ("./kerf bench pictures --page docs/performance.md", ["visualizer/bench/*", "lab/report/pictures.py"]),
+    "docs/performance.md#bridge": ("./kerf bench bridge --page docs/performance.md", ["tests/studies/bridge/*"]),
 }
 # A number comes before a character: 1'000 has no text in it.
 CPP_TOKEN = re.compile(r"""(?P<kept>R"(?P<end>[^(]*)\(.*?\)(?P=end)"|"(?:\\.|[^"\\])*"|\b[0-9][\w.']*|'(?:\\.|[^'\\])*')"""
                        r"""|(?://[^\n]*\n|/\*.*?\*/|\s)+""", re.DOTALL)
-STAMP = re.compile(r"\n*<!-- made by: (.*); sources: ([0-9a-f]{16}) -->\n*\Z")
+STAMP = re.compile(r"^<!-- made by: (.*); sources: ([0-9a-f]{16}) -->\n", re.MULTILINE)
 
 
 def sources(globs):
@@ -66,21 +66,26 @@ def hash_of(globs):
     return hashlib.sha256("\0".join(codes).encode()).hexdigest()[:16]
 
 
-def stamp(page):
-    if page not in PAGES:
-        sys.exit(f"check-pages: {page}: not in the table; it has {', '.join(PAGES)}")
-    command, globs = PAGES[page]
-    text = STAMP.sub("", (ROOT / page).read_text(encoding="utf-8")).rstrip("\n")
-    (ROOT / page).write_text(f"{text}\n\n<!-- made by: {command}; sources: {hash_of(globs)} -->\n", encoding="utf-8")
+def stamp(name):
+    parts = [part for part in PAGES if name in (part, part.partition("#")[0])]
+    if not parts:
+        sys.exit(f"check-pages: {name}: not in the table; it has {', '.join(PAGES)}")
+    page = ROOT / name.partition("#")[0]
+    text = page.read_text(encoding="utf-8")
+    stamps = dict(STAMP.findall(text))
+    for command, globs in map(PAGES.get, parts):
+        stamps[command] = hash_of(globs)
+    lines = "".join(f"<!-- made by: {command}; sources: {code} -->\n" for command, code in stamps.items())
+    page.write_text(STAMP.sub("", text).rstrip("\n") + "\n\n" + lines, encoding="utf-8")
 
 
 def stale():
-    for page, (command, globs) in PAGES.items():
-        found = STAMP.search((ROOT / page).read_text(encoding="utf-8"))
-        if not found:
-            yield f"{page}: no hash of its sources; run {command}, then .ci/check-pages.py --stamp {page}"
-        elif found[1] != command or found[2] != hash_of(globs):
-            yield f"{page}: older than its sources; run {command}, then .ci/check-pages.py --stamp {page}"
+    for part, (command, globs) in PAGES.items():
+        found = dict(STAMP.findall((ROOT / part.partition("#")[0]).read_text(encoding="utf-8"))).get(command)
+        if found is None:
+            yield f"{part}: no hash of its sources; run {command}, then .ci/check-pages.py --stamp {part}"
+        elif found != hash_of(globs):
+            yield f"{part}: older than its sources; run {command}, then .ci/check-pages.py --stamp {part}"
 
 
 def main(words):

@@ -45,7 +45,7 @@ _kerf() {
     fi
   fi
   if ((COMP_CWORD == 1)) || [[ $command == help ]]; then
-    help=$("$1" --help 2>/dev/null | grep -oP '^  (\./)?kerf (\K[a-z-]+|NAME.* any program: \K[a-z ]+)')
+    help=$("$1" --help 2>/dev/null | grep -oP '^  (\./)?kerf (\K[a-z-]+|NAME.* any program: \K[a-z ]+)' | tr ' ' '\n' | sort -u)
     if ((COMP_CWORD > 2)); then help=''; fi
   else
     # What is further to the right belongs to the line before.

@@ -7,12 +7,12 @@
 pages=$root/cli/help
 # Commands that another name has, too.
 declare -A same_as=([sweep]='lab sweep' ['bench kernels']='lab bench' ['bench pictures']=visualizer ['bench safety']='lab faults'
-  ['bench bridge']='studies bridge' ['bench stability']='studies ranges')
+  ['bench bridge']='studies bridge' ['bench ranges']='studies ranges')
 of_clones='setup test docs page package stand-in studies'
 
 # commands: those of this script, by the first screen of its help; programs: those that the help has.
 commands() {
-  sed -nE 's|^  \./kerf ([a-z-]+) .*|\1|p' "$pages/kerf.txt" | if [[ $me == kerf ]]; then grep -vxF "${of_clones// /$'\n'}"; else cat; fi
+  sed -nE '/kerf lab /d; s|^  \./kerf ([a-z-]+) .*|\1|p' "$pages/kerf.txt" | if [[ $me == kerf ]]; then grep -vxF "${of_clones// /$'\n'}"; else cat; fi
 }
 programs() { (cd "$pages" && printf '%s\n' kerf-*.txt) | sed 's/^kerf-\(.*\)\.txt$/\1/'; }
 
@@ -23,7 +23,7 @@ first_screen() {
     return
   fi
   grep -vE "^  \./kerf (${of_clones// /|}) " "$pages/kerf.txt" | sed 's/source <(.*)/bash-completion brings it/; s|\./kerf|kerf|g'
-  echo "Here it is installed: ${of_clones// /, }, bench safety, bench bridge and bench stability need a clone of its sources."
+  echo "Here it is installed: ${of_clones// /, }, bench safety, bench bridge and bench ranges need a clone of its sources."
 }
 
 # read_help NAME [COMMAND]: of a command or program, in `page` the text, in `takes` the value of each option (empty: a flag), in `words`

@@ -5,7 +5,7 @@ set -euo pipefail
 cat <<HEAD
 .TH KERF 1 "" "kerf $1" "kerf"
 .SH NAME
-kerf \- feel, mill and see a tooth
+kerf \- haptic milling of a tooth
 .SH SYNOPSIS
 .B kerf
 \fICOMMAND\fR [\fIOPTION\fR]...

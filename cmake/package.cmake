@@ -6,7 +6,18 @@ set(CPACK_PACKAGE_VENDOR kerf)
 set(KERF_MAINTAINER "The authors of kerf <kerf@packages.invalid>" CACHE STRING
   "Name and address of who makes these packages, for their users' questions")
 set(CPACK_PACKAGE_CONTACT "${KERF_MAINTAINER}")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "feel, mill and see a tooth")
+# Homepage of the packages: the repository of this clone, unless given.
+find_package(Git QUIET)
+if(GIT_FOUND)
+  execute_process(COMMAND ${GIT_EXECUTABLE} -C ${PROJECT_SOURCE_DIR} remote get-url origin
+    OUTPUT_VARIABLE origin OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+endif()
+if(NOT origin MATCHES "^https?://[^@]*$")
+  set(origin "")
+endif()
+set(KERF_HOMEPAGE "${origin}" CACHE STRING "Where users of these packages report: the repository or its issue tracker")
+set(CPACK_PACKAGE_HOMEPAGE_URL "${KERF_HOMEPAGE}")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "haptic milling of a tooth")
 set(CPACK_COMPONENT_KERF_DESCRIPTION "A deterministic haptic controller lets a dental bur cut a tooth of voxels, or
 any CT. It has its pictures, a recorder, a bridge to browsers and to a second
 machine, and an emulator of the device, so that no hardware is needed.")

@@ -202,7 +202,7 @@ class Progress:
 def explain(say, told, options, seconds):
     """Before anything moves."""
     what = told["device.personality"]
-    say(f"{what} at --port {options.port}" if options.port else f"an emulated {what}; --port PORT: a real one (docs/devices.md)")
+    say(f"{what} at --port {options.port}" if options.port else f"an emulated {what}; --port PORT: a real one (docs/first-hour.md)")
     say(f"the device will move by itself for {seconds:.0f} s, by at most {float(told['limits.force_n']):g} N: free {MOST_MM:.0f} mm around its tip")
     say("take it out of its rest, to the middle of its space, and let go: hands off while it moves")
     say("to stop it: Ctrl-C; grasping it is safe, too, and spoils the seconds in which you do")
@@ -216,7 +216,7 @@ def record(binaries, options, seconds=SECONDS):
     scene = ["--scene", options.scene, *(["--device", options.device] if options.device else [])]
     told = checked(binaries, scene)
     if options.port and "device.torque_scale" not in told:
-        raise Refused(f"--scene {options.scene}: no device.torque_scale, so the motors stay off; add it (docs/devices.md)")
+        raise Refused(f"--scene {options.scene}: no device.torque_scale, so the motors stay off; add it (docs/first-hour.md)")
     explain(say, told, options, seconds)
     if options.port and sys.stdin.isatty() and sys.stdout.isatty():
         try:

@@ -57,7 +57,7 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   app.option("--kernels", options.kernels, "those of an instruction set, as scalar or avx2")
       .shown_as("NAME");
   app.option("--set", options.changes.settings,
-             "another value of a key of the scene; may be given often")
+             "another value of a key of the scene; may be repeated")
       .one_each()
       .shown_as("KEY=VALUE");
   app.option("--law", law, "another force law: --set force.law=NAME").shown_as("NAME");

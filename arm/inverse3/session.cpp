@@ -60,7 +60,7 @@ std::string text_of(Bar bar) {
              "button";
     case Bar::unproven:
       return "the device stays idle under the force command, so the service does not obey it; "
-             "report the service's version to us (docs/devices.md)";
+             "report the service's version (docs/first-hour.md)";
     case Bar::moved_frame:
       return "the session's basis or mount is not the identity, so forces would point elsewhere; "
              "set basis "
@@ -356,8 +356,8 @@ std::string Session::why_unread() const {
   double farthest = 0;
   for (const double part : *metres) farthest = std::max(farthest, std::abs(part));
   return "its position of the device is " + number_text(farthest) +
-         " m away, and no arm reaches 1 m: is it in millimetres? Report the service's version to "
-         "us (docs/devices.md); see the vendor's Hub";
+         " m away, and no arm reaches 1 m: is it in millimetres? Report the service's version "
+         "(docs/first-hour.md); see the vendor's Hub";
 }
 
 CartesianReport Session::farewell(std::uint32_t number) const noexcept {

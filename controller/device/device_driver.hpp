@@ -52,8 +52,8 @@ class DeviceDriver {
   ///
   /// No shorter, since an arm may truly stand still: its friction (0.2 to 0.3 N) hides the tremor
   /// of the hand that holds it (0.1 mm on a grip of 0.5 N/mm), until the hand's force drifts by as
-  /// much, and a weight is measured at an arm that rests for two seconds (docs/devices.md). Such an
-  /// arm answers the fading force by a motion, or loses it.
+  /// much, and a weight is measured at an arm that rests for two seconds (docs/first-hour.md). Such
+  /// an arm answers the fading force by a motion, or loses it.
   static constexpr double kStillS = 3.0;
   /// For a measurement, whose emulated hand may stand still under force without end.
   void allow_stillness() noexcept { most_still_reads_ = UINT32_MAX; }

@@ -77,7 +77,8 @@ class CompiledScene : public AnyServo {
   virtual void take(LoadedScene& scene) = 0;
 
   /// Plan and state of each arm as `servo_step` takes them, in the numbers of the scene: for a
-  /// program that steps them itself (docs/bare-metal.md). They point into this servo. After `take`.
+  /// program that steps them itself (docs/determinism.md). They point into this servo. After
+  /// `take`.
   [[nodiscard]] virtual std::variant<Arms<FixedNumbers>, Arms<DoubleNumbers>> parts()
       const noexcept = 0;
 

@@ -22,7 +22,7 @@ namespace kerf {
 namespace {
 
 constexpr const char* kAbout =
-    "The servo of kerf: reads the device, feels and mills the scene, commands the force.\n";
+    "The servo of kerf: reads the device, computes contact and cut, commands the force.\n";
 constexpr const char* kExitCodes =
     "\nExit codes: 0 fine, 1 ran and met a fault, 2 bad input or set-up.\n"
     "Try it without hardware: ./kerf demo";
@@ -55,7 +55,7 @@ struct Raw {
 /// Scene, device and run.
 void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--scene", options.scene, "scene file (TOML)").shown_as("FILE");
-  app.option("--set", raw.settings, "another value of a key of the scene; may be given often")
+  app.option("--set", raw.settings, "another value of a key of the scene; may be repeated")
       .one_each()
       .shown_as("KEY=VALUE");
   app.option("--volume", options.overrides.volume_file,
@@ -76,7 +76,7 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
              "CPU time that parsing a volume or a mesh may take")
       .within(1, kMostReadCpuSeconds)
       .shows_default();
-  app.option("--device", raw.device, "what is held, instead of the scene's")
+  app.option("--device", raw.device, "the device, instead of the scene's")
       .one_of(words_of(kPersonalityWords))
       .shown_as("NAME");
   app.option(
@@ -85,12 +85,13 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
       .values(3, 6)
       .within(-kMaxTorqueScale, kMaxTorqueScale)
       .shown_as("A,B,C");
-  app.option(
-         "--port", options.ports,
-         "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
-         "[,firmware=FILE]; arm, which starts kerf-arm if none runs, or arm:NAME of one that does; "
-         "socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator; "
-         "twice for a scene with two devices, in their order")
+  app.option("--port", options.ports,
+             "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; fw also "
+             "[,20010] and [,fill]; usb also [,firmware=FILE]; arm, which starts kerf-arm if none "
+             "runs, "
+             "or arm:NAME of one that does; "
+             "socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator; "
+             "twice for a scene with two devices, in their order")
       .one_each()
       .shown_as("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
@@ -100,7 +101,7 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
       .shown_as("S");
   app.option(
          "--wait", options.wait_s,
-         "give up with exit code 1 where the device is not taken in hand after so much servo time")
+         "give up with exit code 1 if the user has not picked up the device after this servo time")
       .within(0.01, kLongestS)
       .shown_as("S")
       .shows_default();
@@ -119,14 +120,13 @@ void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--name", options.name, "name under which readers find the segment").shows_default();
   app.flag("--virtual", options.virtual_time,
            "lock-step with the device, no clock: the same input gives the same bits");
-  app.option(
-         "--until", options.until,
-         "with --virtual: go on only to the tick that the other end of this FIFO allows (--lead "
-         "of visualizer and recorder); may be given often")
+  app.option("--until", options.until,
+             "with --virtual: go on only to the tick that the reader of this FIFO allows (--lead "
+             "of visualizer and recorder); may be repeated")
       .one_each()
       .shown_as("FIFO");
   app.flag("--unchecked-gain", options.unchecked_gain,
-           "give a real device a stiffness and damping above its own bounds or stability; the "
+           "allow a stiffness and damping above the device's bounds or the stable range; the "
            "limits of force stay");
   app.flag("--strict", options.real_time.strict, "refuse to start without every real-time right");
   app.flag("--guard", options.guard,
@@ -148,11 +148,11 @@ void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
            "print every key of a scene file as a page of Markdown, and end");
   const Option explain_flag =
       app.flag("--explain", options.explain,
-               "tell what the scene costs: methods, operations, time, memory; and end")
+               "print the cost of the scene: methods, operations, time, memory; and end")
           .excludes(check_flag);
   app.flag("--probe", options.probe,
-           "no scene needed: show what the device says, its motors off; without --port, what "
-           "is connected and what is missing")
+           "no scene needed: show the reports of the device, its motors off; without --port, "
+           "the connected devices and what is missing")
       .excludes(check_flag)
       .excludes(explain_flag);
   app.flag("--progress", options.progress, "show a progress bar on a terminal");

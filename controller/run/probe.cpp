@@ -125,11 +125,11 @@ void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& se
   if (kind_of(device.personality).needs_encoder_sign && !device.encoder_sign) {
     lacks.push_back({name + ": device.encoder_sign is not set; the makers' branches differ in it",
                      "push the tip to the right, up, towards you: x, y, z must rise, else turn a "
-                     "sign: docs/devices.md"});
+                     "sign: docs/first-hour.md"});
   }
   if (!device.torque_scale) {
     lacks.push_back({name + ": device.torque_scale is not set, so its motors will stay off",
-                     "measure it: docs/devices.md"});
+                     "measure it: docs/first-hour.md"});
   }
 }
 

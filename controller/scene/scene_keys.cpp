@@ -197,7 +197,7 @@ constexpr SceneKey kKeys[] = {
      "tells it from others in pictures and reports",
      {}, {.default_text = "shape and size, or the file's"}},
     {"tool.bur", "", at<&ToolSpec::bur>, {},
-     "a bur of ISO 6360 in place of shape, radius and shaft: its head (docs/own-tool.md) and its diameter "
+     "a bur of ISO 6360 in place of shape, radius and shaft: its head (docs/scenes.md) and its diameter "
      "in tenths of a mm, such as \"001 014\"", {}, {.default_text = "none"}},
     {"tool.shape", "", at<&ToolSpec::shape>, one_of(kShapeWords),
      "a solid of revolution about y with its tip toward -y, or the mesh of a file",
@@ -254,7 +254,7 @@ constexpr SceneKey kKeys[] = {
      "scene point under the device's origin", {}, {.default_text = "the first surface below +y; with an external force [0, 0, 0]"}},
     {"device.torque_scale", "N mm", at<&DeviceSettings::torque_scale>,
      between(-kMaxTorqueScale, kMaxTorqueScale),
-     "at each joint per motor count, at least 0.001; the sign is the motor's; of inverse3, touch and omega the true force along x, y, z over the commanded one: 1 (docs/devices.md)",
+     "at each joint per motor count, at least 0.001; the sign is the motor's; of inverse3, touch and omega the true force along x, y, z over the commanded one: 1 (docs/first-hour.md)",
      {}, {.default_text = "the motors stay off"}},
     {"device.dock_rad", "rad", at<&DeviceSettings::dock_rad>, between(-3.15, 3.15),
      "joint angles in the inkwell", kOmni, {.json = InJson::always}},
@@ -274,7 +274,7 @@ constexpr SceneKey kKeys[] = {
      "force per mm^2 of surface", kPaper},
     {"force.stiffness_n_per_mm", "N/mm", at<&ForceSettings::stiffness_n_per_mm>,
      between(kMinStiffnessNPerMm, kMaxStiffnessNPerMm),
-     "of the coupling, at the device; how much of it is stable: docs/devices.md, \"Gains\"; external: the most that a goal of the program may have", kCoupled},
+     "of the coupling, at the device; how much of it is stable: docs/gains.md; external: the most that a goal of the program may have", kCoupled},
     {"force.damping_ns_per_mm", "N s/mm", at<&ForceSettings::damping_ns_per_mm>,
      between(0, kMaxDampingNsPerMm), "of the coupling, at the device; external: the most that a goal of the program may have", kCoupled},
     {"force.stale_ms", "ms", at<&ForceSettings::stale_ms>, between(1, 1000),

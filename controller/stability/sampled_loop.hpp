@@ -10,7 +10,7 @@
 
 namespace kerf {
 
-/// Figures of a device at its tip, from published sources (docs/devices.md, "Gains"). No unit was
+/// Figures of a device at its tip, from published sources (docs/gains.md). No unit was
 /// measured: a row is for checks and maps, never a claim about a unit.
 struct DeviceFigures {
   Personality personality;

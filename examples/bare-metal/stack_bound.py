@@ -15,7 +15,7 @@ import sys
 
 LIBRARY_BYTES = 128  # memcpy saves 3 registers, a division of 64 bits at most 12
 LIBRARY = {"memcpy", "memmove", "memset", "__aeabi_ldivmod", "__aeabi_uldivmod", "__aeabi_l2d", "__aeabi_ul2d", "__aeabi_d2lz",
-           "__ctzdi2"}  # docs/bare-metal.md
+           "__ctzdi2"}  # docs/determinism.md
 ROOT = "kerf_start"
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # A machine of its own for kerf: Debian's kernel under QEMU, in virtual time, with nothing in it but
-# our programs (docs/devices.md tells what that shows). Needs no root.
+# our programs (docs/stand-ins.md tells what that shows). Needs no root.
 #     hil/guest/guest.sh image PROGRAMS FOLDER   makes the image in FOLDER of the programs in PROGRAMS
 #     hil/guest/guest.sh boot FOLDER LOG         runs it; what it prints is LOG
 #     hil/guest/guest.sh lacks                   says what this machine lacks for that

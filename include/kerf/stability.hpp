@@ -63,7 +63,7 @@ inline constexpr double kMaxDelayPeriods = 64;
 [[nodiscard]] std::string problem_in(const SampledLoop& loop);
 
 /// The loop of a device ("omni", "falcon", "woodenhaptics", "inverse3", "touch", "omega") by the
-/// figures of docs/devices.md, without a hand: a light grip is the worst case. Or of a file of
+/// figures of docs/gains.md, without a hand: a light grip is the worst case. Or of a file of
 /// `kerf identify`, whose name ends in .toml, in a direction: MapOptions. Throws Error for another
 /// name, a file that is no device, or a rate that is not positive.
 [[nodiscard]] SampledLoop device_loop(std::string_view device, double rate_hz,

@@ -183,7 +183,7 @@ SweepCommand::SweepCommand(Arguments& program)
                  "a demo in lock-step for each combination of values, as one table") {
   app_.option("SCENE", scene_, "scene file (TOML)").required();
   app_.option("--set", set_,
-              "an axis: a key of docs/scene-keys.md, or emulator.OPTION; may be given often")
+              "an axis: a key of docs/scene-keys.md, or emulator.OPTION; may be repeated")
       .required()
       .one_each()
       .shown_as("KEY=LO:HI:N or KEY=A,B,C");

@@ -22,7 +22,7 @@ KINDS = {
     ("burs", "sheet"): True,
     ("kernels", "page"): False,
     ("energy", "page"): False, ("energy", "tables"): False,
-    ("pictures", "page"): False, ("pictures", "summary"): False, ("pictures", "tables"): False,
+    ("pictures", "page"): False, ("pictures", "tables"): False,
     ("accuracy", "page"): False, ("accuracy", "plot"): True,
     ("contact", "page"): False, ("contact", "plot"): True, ("contact", "hands"): True,
     ("impedance", "plot"): True,

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/pictures.md, the part of docs/performance.md on pictures, and the tables of both for the terminal. JSON of `kerf bench
-pictures --report`:
+"""The part of docs/performance.md on pictures, and its tables for the terminal. JSON of `kerf bench pictures --report`:
 
     day, processor, gl_renderer, cores, width, height       of the run
     cast_set                    instruction set of the rays of `cast` and `cast-blend`
@@ -11,9 +10,9 @@ pictures --report`:
 import text
 
 ABOUT = """\
-# Pictures
+## Pictures
 
-Made by `./kerf bench pictures --page docs/pictures.md`; every figure comes from one run, nothing is
+Made by `./kerf bench pictures --page docs/performance.md`; every figure comes from one run, nothing is
 typed by hand but the paper's. Machines are noisy: compare figures of the same run.
 
 The time of a frame: update of the renderer and drawing of the volumes, without tool and panel, with a camera at rest.
@@ -33,7 +32,7 @@ If `gl` below is a software OpenGL, the figures of `iso`, `blend`, `surface` and
 """
 
 GRADIENTS = """
-## Gradients
+### Gradients
 
 The cost of `--gradient` for `iso` on the padded 256x256x161 volume, and the angle between its normals and the exact ones
 on a ball of 28 voxels radius, root mean square and for 99 of 100 pixels: `ball` has a border that is antialiased over two
@@ -45,15 +44,6 @@ axis, five of the longest edges to each side; the others count voxels. `surface`
 shade by the same gradients; their tests hold `adaptive` to 3 degrees for 99 of 100 points of a ball from 1x1x1 to 1x10x10.
 `corners` turns the highest frequency of the voxels round, so it draws a hatching on smooth surfaces, and `central` draws
 rings.
-
-"""
-
-SUMMARY = """\
-## Pictures
-
-Of `docs/pictures.md`, which has all volumes and tools and says how: the padded tooth of 256x256x161
-voxels, at rest and after a ball of 16 voxels was cut, by
-`./kerf bench pictures --page docs/pictures.md --summary docs/performance.md`.
 
 """
 
@@ -130,17 +120,3 @@ def page(data):
 
 def tables(data):
     return picture_table(data) + "\n" + gradient_table(data)
-
-
-def summary(data):
-    """The padded tooth by every renderer."""
-    rows = [row for row in padded_tooth(text.rows_of(data)) if row["gradient"] == "adaptive"]
-    lines = []
-    for row in rows:
-        fps, cpu, whole = (find(rows, key, 16, partial, renderer=row["renderer"])
-                           for key, partial in (("fps", True), ("cpu_ms", True), ("cpu_ms", False)))
-        if row["tool"] == 0 and not row["partial"] and fps is not None and whole is not None:
-            lines.append([row["renderer"], figure(row["fps"]), figure(fps), figure(row["cpu_ms"]), figure(cpu),
-                          f"1/{figure(whole / cpu)}", paper_rate(row)])
-    return SUMMARY + machine(data) + text.table(["renderer", ">fps: static", ">16^3 partial", ">cpu ms: static", ">16^3 partial",
-                                                 ">partial / full", "paper fps"], lines)

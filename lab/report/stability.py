@@ -6,13 +6,15 @@ measure reads {program, quick, jobs, provenance}: the path of kerf-lab, whether 
 
     provenance
     devices, rates              maps as `kerf lab zwidth --json` writes them (stability_map.py)
-    table                       rows {device, delay, damping, exact, axis, held, arm}: texts, then the lowest K of each
+    table                       rows {device, delay, damping, exact, axis, held, arm, checked}: texts, then the lowest K of each;
+                                at last the highest K that `kerf-controller --check` accepts without a warning, 0: none
     stabilisers                 rows {device, delay, lowest: {STABILISER: [one axis, whole arm]}}
     knobs                       rows {name, unit, value, standard, swings, active, exact, re_entry}
     numbers                     rows {numeric, cells, others, columns, factor}"""
 import json
 import math
 import os
+import re
 import subprocess
 import tempfile
 
@@ -78,15 +80,16 @@ device's map.
   without friction, encoder steps and limits. A picture draws it in black for that loop alone, dotted beside others.
 * The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
 * Each measured K is the lowest of five seeds; undecided counts as unstable. The whole arm has 14 stiffnesses.
-* *Recommended K* is the minimum of the row over 1.5. The margin covers phases and islands between two steps that no run
-  of the map met. Of 10,000 random presses at each of them none oscillates or is active (`zwidth_maps`, the part `ranges`
-  of `.ci/all`); a few in 180,000 are undecided: push and twice the friction are the peak there, so the tip creeps out.
+* *Safe K, emulated* is the minimum of the row over 1.5, for the emulated device alone. The margin covers phases and islands between two
+  steps that no run of the map met. Of 10,000 random presses at each of them none oscillates or is active (`zwidth_maps`, the
+  part `ranges` of `.ci/all`); a few in 180,000 are undecided: push and twice the friction are the peak there, so the tip creeps out.
+* **Safe K, real unit**, in bold, is the highest stiffness of the row's device and B that `kerf controller --check` accepts without a warning at
+  1 kHz: **the one to use with a real device that nobody has measured**. It assumes less viscous damping than the emulator has
+  (0.0002 N s/mm), a delay of 2 ms in each row, and takes nothing above the published maximum of the device
+  ([gains](gains.md)). A row without it has a B above that maximum.
 * The delay of a real device is not known; assume two periods until you measure it.
 * Take no more damping than the map shows as stable: beyond its maximum the lag of the velocity and the encoder steps
   drive the oscillation.
-
-These are the emulator's devices. The check of a scene (docs/devices.md, "Gains") is stricter: less viscous damping,
-0.0002 N s/mm, and a delay of 2 ms at every rate, because it applies to units that nobody has measured.
 
 """
 
@@ -257,10 +260,38 @@ def measure_devices(maps, devices):
             exact = {value(column, "delay"): exact_of(column) for column in maps.measure(axes, 2)["columns"]}
             axis = maps.lowest({**axes, "hand": "none,firm"}, False)
             arm = maps.lowest(axes, True)
+            checked = highest_checked(maps.program, device, damping)
             rows += [{"device": NAMES[device], "delay": delay, "damping": damping, "exact": exact[delay],
                       "axis": axis[device, delay, "none"], "held": axis[device, delay, "firm"],
-                      "arm": arm[device, delay, "none"]} for delay in delays.split(",")]
+                      "arm": arm[device, delay, "none"], "checked": checked} for delay in delays.split(",")]
     return rows
+
+
+def highest_checked(program, device, damping):
+    """The highest stiffness, rounded down, that --check accepts without a warning for a device at 1 kHz; 0 if it refuses the damping."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = os.path.join(folder, "wall.toml")
+
+        def said(stiffness):
+            with open(scene, "w", encoding="utf-8") as file:
+                file.write('[[volume]]\nfile = "phantom"\nshape = "wall"\nsize = [64, 64, 40]\niso = 0.5\n'
+                           '[[tool]]\nshape = "ball"\nradius_mm = 2\n[cut]\nmodel = "none"\n'
+                           f'[device]\npersonality = "{device}"\n'
+                           f"[force]\nstiffness_n_per_mm = {stiffness:.9g}\ndamping_ns_per_mm = {damping}\n")
+            done = subprocess.run([os.path.join(os.path.dirname(program), "kerf-controller"), "--check", "--scene", scene],
+                                  capture_output=True, text=True, check=False)
+            return done.stdout + done.stderr
+
+        text_of_least = said(0.01)
+        if "force.damping_ns_per_mm" in text_of_least and "is above" in text_of_least:
+            return 0
+        found = re.search(r"^highest_stable_stiffness_n_per_mm=(.*)$", text_of_least, re.MULTILINE)
+        if not found:
+            raise text.BadInput(f"kerf-lab: kerf-controller --check: {text_of_least.strip()}")
+        highest = float(below(float(found[1]) / MARGIN, 2))
+        if cap := re.search(r"force\.stiffness_n_per_mm = \S+ is above ([\d.]+)", said(highest)):
+            return float(cap[1])
+        return highest
 
 
 def measure_stabilisers(maps):
@@ -318,18 +349,22 @@ def below(number, digits):
     return f"{math.floor(number / step + 1e-9) * step:.{digits}g}"
 
 
-def recommended(row):
+def emulated(row):
     least = min(row["axis"], row["held"], row["arm"], row["exact"])
-    return f"**{below(least / MARGIN, 2) if least > 0 else 'none'}**"
+    return below(least / MARGIN, 2) if least > 0 else "none"
+
+
+def checked(row):
+    return f"**{below(row['checked'], 2)}**" if row["checked"] > 0 else "none"
 
 
 def page(data, devices, rates):
     kinds, first = list(text.rows_of(data, "stabilisers")[0]["lowest"]), first_below(data["highest_n_per_mm"])
     return (ABOUT + f"## Devices\n\n![Maps of three devices]({devices})\n\n" + DEVICES
             + text.table(["device", ">delay, periods", ">B, N s/mm", ">linear, exact", ">one axis", ">with a firm hand",
-                          ">whole arm", ">recommended K"],
+                          ">whole arm", ">safe K, emulated", ">safe K, real unit"],
                          [[row["device"], row["delay"], row["damping"], text.figure(row["exact"]), first(row["axis"]),
-                           first(row["held"]), first(row["arm"]), recommended(row)] for row in text.rows_of(data, "table")])
+                           first(row["held"]), first(row["arm"]), emulated(row), checked(row)] for row in text.rows_of(data, "table")])
             + STABILISERS
             + text.table(["device", ">delay, periods", *(f">{kind}" for kind in kinds)],
                          [[row["device"], row["delay"], *(" / ".join(map(first, row["lowest"][kind])) for kind in kinds)]

@@ -265,7 +265,7 @@ class ColumnRun {
   /// small for any encoder, and at rest in double.
   bool is_arithmetic(const LimitCycle& fixed, double stiffness, const std::vector<Attempt>& all,
                      double part) {
-    constexpr double kFinestStepMm = 1e-3;  // a tenth of the omega's (docs/devices.md)
+    constexpr double kFinestStepMm = 1e-3;  // a tenth of the omega's (docs/gains.md)
     if (fixed.rests() || fixed.travel_mm > kFinestStepMm || spec_.arm ||
         subject_.numeric != NumericKind::fixed || subject_.loop.quantum_mm > 0) {
       return false;

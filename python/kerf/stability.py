@@ -145,7 +145,7 @@ def cell(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=10
     stiffness_n_per_mm, damping_ns_per_mm: of the wall, N/mm and N s/mm. device, rate_hz: whose loop, map_loop, unless `loop`, a
     kerf.SampledLoop, is given. push_n: of the hand, above Coulomb friction, N. seconds: to which a run that is still open is followed. seed: shifts the
     encoder's steps against the wall; 0: one lies on it. In a map, seed s and press number h (of 0.5 N from 0.1 mm: 0, 50, 200 mm/s) have
-    s * 2**32 + h. law:
+    `s * 2**32 + h`. law:
     "coupling", "linear", "two_sided", the name of a law, or a function as of Loop.law, which gets the stiffness and damping, too.
     numeric: "fixed" or "double". limits: peak and slew of the default device. The same values give the same bits. Returns a
     kerf.Cell. Raises kerf.Error."""

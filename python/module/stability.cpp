@@ -117,7 +117,7 @@ void define_stability(py::module_& module) {
       .def_readwrite("quantum_mm", &SampledLoop::quantum_mm, "of the encoders, at the tip");
   module.def("device_loop", &device_loop, py::arg("device"), py::arg("rate_hz") = 1000.0,
              py::arg("direction") = "",
-             "The SampledLoop of a unit of a device by the figures of docs/devices.md, without a "
+             "The SampledLoop of a unit of a device by the figures of docs/gains.md, without a "
              "hand: with the assumed delay of 2 ms of its bus. map_loop is that of the emulated "
              "one. Or of a device.toml of kerf identify, in a direction as of zwidth.");
 

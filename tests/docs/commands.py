@@ -3,7 +3,7 @@
 """Whether the commands that the pages print are commands:  commands.py ROOT BIN check|tutorial
 
 check: every option of every `./kerf` line of README.md and docs/, and of every `./kerf` within their text, is one that the
-program's --help knows.
+program's --help knows, and so is its value, if the help lists the words or the range that it may be.
 tutorial: the lines of docs/tutorial.md, run one after the other in a scratch folder, all end well, and each
 file that the page names is there then."""
 import functools
@@ -23,24 +23,67 @@ environment = dict(os.environ, KERF_BIN=str(bin_folder))
 environment.pop("DISPLAY", None)
 
 
+def same_as():
+    """The commands of ./kerf that are another name of a program's, by cli/help.sh."""
+    names = re.search(r"same_as=\((.*?)\)", (root / "cli" / "help.sh").read_text(encoding="utf-8"), re.S)[1]
+    return {command: target.strip("'").split() for command, target in re.findall(r"\['?([^]']+)'?\]=('[^']*'|\S+)", names)}
+
+
 @functools.cache
-def help_of(*command):
-    return subprocess.run([*command, "--help"], capture_output=True, text=True, env=environment).stdout
+def stored_help(name, command=""):
+    """The help of a program, or of a command within it, as cli/help has it; the test stored_help compares it with the program's."""
+    whole = root / "cli" / "help" / f"{name}.txt"
+    if whole.exists():
+        return whole.read_text(encoding="utf-8")
+    file = root / "cli" / "help" / f"kerf-{name}.txt"
+    parts = re.split(r"^## kerf-", file.read_text(encoding="utf-8"), flags=re.M) if file.exists() else []
+    return "".join(part for part in parts if part.partition("\n")[0] == f"{name} {command}".strip())
 
 
-def known_options(words):
-    """Options of `./kerf WORDS...`: those of kerf itself, or of a program and its subcommand."""
-    if words[0] in ("demo", "test", "bench", "completion", "doctor", "setup", "docs", "page", "package", "sweep", "stand-in", "identify"):
-        text = help_of(root / "kerf", words[0]) + (help_of(bin_folder / "kerf-lab", "sweep") if words[0] == "sweep" else "")
-        text += help_of(bin_folder / "kerf-studies", "ranges") + help_of(bin_folder / "kerf-lab", "faults")
-        text += help_of(bin_folder / "kerf-lab", "bench") + help_of(bin_folder / "kerf-visualizer")
-    elif words[:2] == ["studies", "ablate"]:
-        text = help_of(root / "kerf", "studies", "ablate")
-    else:
-        text = help_of(bin_folder / ("kerf-" + words[0]))
-        if len(words) > 1 and re.fullmatch(r"[a-z][a-z-]*", words[1]):
-            text += help_of(bin_folder / ("kerf-" + words[0]), words[1])
-    return set(re.findall(r"--[a-z][a-z0-9-]*", text)) | {"--help"}
+def help_for(words):
+    """The help of `./kerf WORDS...`: of a command or program, and of the command within it."""
+    named = [word for word in words[:2] if re.fullmatch(r"[a-z][a-z-]*", word)]
+    alias = same_as().get(" ".join(named)) or same_as().get(named[0]) or []
+    return "".join(stored_help(*some) for some in (named[:1], named[:2], alias[:1], alias[:2]) if some)
+
+
+def options_of(text):
+    """Each option of a help, with the rule of its values: a set of words, the ends of a range, or None for any."""
+    found = {"--help": None}
+    for line in text.splitlines():
+        for option in re.findall(r"--[a-z][a-z0-9-]*", line):
+            found.setdefault(option, None)
+        if row := re.match(r"\s+(?:-[a-z],)?(--[a-z][a-z0-9-]*) .*?:(?:\{([^}]*)\}|\[([-\d.e+]+) - ([-\d.e+]+)\])", line):
+            found[row[1]] = set(row[2].split(",")) if row[2] else (float(row[3]), float(row[4]))
+    return found
+
+
+def refused(value, rule):
+    """The first part of a value that a rule refuses. A word in capitals stands for the reader's own."""
+    for part in value.split(",") if rule else []:
+        if re.fullmatch(r"[A-Z]+|\.\.\.|\$.*|.*:.*", part):  # what a range of an axis holds, the program checks
+            continue
+        if isinstance(rule, set):
+            if part not in rule:
+                return part
+        elif re.fullmatch(r"-?[\d.]+(e-?\d+)?", part) and not rule[0] <= float(part) <= rule[1]:
+            return part
+    return None
+
+
+def faults_of(words):
+    """What the program that `./kerf WORDS...` starts refuses of these words, by its --help."""
+    known = options_of(help_for(words))
+    for word, behind in zip(words, [*words[1:], ""]):
+        if word == "--":
+            return
+        option, is_joined, value = word.partition("=")
+        if not re.fullmatch(r"--[a-z][a-z0-9-]*", option):
+            continue
+        if option not in known:
+            yield f"{option} is no option of ./kerf {words[0]}"
+        elif part := refused(value if is_joined else behind, known[option]):
+            yield f"{option} of ./kerf {words[0]} takes no {part}"
 
 
 def check():
@@ -55,10 +98,7 @@ def check():
                 if words[0].startswith("-") or words[0].isupper() or words[0] == "help":
                     continue
                 checked += 1
-                known = known_options(words)
-                wrong += [f"{page.name}:{number}: {word} is no option of ./kerf {words[0]}"
-                          for word in (w.split("=")[0] for w in words)
-                          if re.fullmatch(r"--[a-z][a-z0-9-]*", word) and word not in known]
+                wrong += [f"{page.name}:{number}: {fault}" for fault in faults_of(words)]
     print(*wrong, sep="\n")
     print(f"{checked} commands checked, {len(wrong)} wrong")
     return not wrong and checked > 30

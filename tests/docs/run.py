@@ -37,7 +37,7 @@ NOT_HERE = {
         "./kerf bridge serve", "./kerf bridge join"],
     "runs in the test own_law": ["own-law.md: "],
     "builds with KERF_PYTHON; the examples run in the test python_page": ["python.md: "],
-    "needs compilers for other processors; .ci/all determinism runs its images": ["bare-metal.md: "],
+    "needs compilers for other processors; .ci/all determinism runs its images": [".ci/packages.sh all"],
     "fetches and builds programs of others": ["tests/standin/others/run.sh"],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake",
                                                 "packages.md: python3 -m venv", "venv/bin/pip install"],

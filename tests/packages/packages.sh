@@ -66,13 +66,13 @@ done
 (cd "$home" && kerf-lab faults --device omni --seeds 1 --scripts hil/faults/gone.toml >/dev/null) ||
   fail 'kerf-lab faults: does not find its scripts'
 [[ ! -e $home/usr/bin/kerf-studies && ! -e $home/usr/share/kerf/lab/report/contact.py ]] || fail 'kerf-studies: is installed'
-for command in test 'bench safety' 'bench bridge' 'bench stability' studies 'demo --two-machines'; do  # whole, or nothing
+for command in test 'bench safety' 'bench bridge' 'bench ranges' studies 'demo --two-machines'; do  # whole, or nothing
   # shellcheck disable=SC2086
   [[ $(kerf $command 2>&1) == "kerf: ${command/ --/: --}: this kerf is installed; "* ]] || fail "kerf $command: runs without sources"
 done
 ! kerf --help | grep -q '\./kerf' || fail 'kerf --help: speaks of ./kerf'
 ! kerf --help | grep -q 'kerf setup' || fail 'kerf --help: lists what needs a clone'
-kerf --help | grep -q 'bench stability need a clone' || fail 'kerf --help: does not say what needs a clone'
+kerf --help | grep -q 'bench ranges need a clone' || fail 'kerf --help: does not say what needs a clone'
 for scene in touch touch.toml scenes/touch.toml; do  # from any folder, by its name
   (cd "$home" && kerf controller --check --scene $scene 2>/dev/null) | grep -qx "scene=$scenes/touch.toml" ||
     fail "kerf controller --scene $scene: does not find it"

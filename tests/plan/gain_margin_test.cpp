@@ -200,13 +200,13 @@ TEST_CASE("a real device takes no more than is known of it, each its own") {
   CHECK(device_limit_error(scene) == "");
 }
 
-TEST_CASE("no device takes gains above those of the source that docs/devices.md names for it") {
+TEST_CASE("no device takes gains above those of the source that docs/gains.md names for it") {
   struct Published {
     Personality device;
     const char *name, *source;
     double stiffness, damping;  // N/m and N s/m, as the sources have them
   };
-  std::ifstream file(KERF_DOCS "/devices.md", std::ios::binary);
+  std::ifstream file(KERF_DOCS "/gains.md", std::ios::binary);
   const std::string page((std::istreambuf_iterator<char>(file)), {});
   for (const Published& row :
        {Published{Personality::omni, "Omni", "CHAI3D 3.3.0 has for omni", 700, 5},

@@ -153,7 +153,7 @@ class Bump {
   Frame frame_;
 };
 
-/// F8 of docs/validation.md: slides once over the bump.
+/// F8 of docs/contact.md: slides once over the bump.
 template <class N>
 void slide_over(const BumpSlide& slide, RandomNumbers& random, SlideFigures& figures) {
   const Bump bump(slide, random);
@@ -347,7 +347,7 @@ struct Shaken {
   double longest_jump = 0;  ///< of the proxy in a tick
 };
 
-/// F7 of docs/validation.md: a hand at the face of a wall of `thickness` units, tilted anyhow, goes
+/// F7 of docs/contact.md: a hand at the face of a wall of `thickness` units, tilted anyhow, goes
 /// random steps of 0.1 to 10 m/s (at 0.1 mm a unit and 1 kHz), with small turns and large ones. No
 /// supervisor stops it. `made` is the tool's. Depths and crossings count from density 1/2.
 template <class N>

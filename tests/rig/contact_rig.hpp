@@ -204,7 +204,7 @@ class ShaftRig {
   ProxyState<N> state_;
 };
 
-/// F9 of docs/validation.md: the rest position of a tool. In 20 ticks a hand presses it from `off`
+/// F9 of docs/contact.md: the rest position of a tool. In 20 ticks a hand presses it from `off`
 /// units above `at`, along `up`, to one unit below.
 template <class N>
 [[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,

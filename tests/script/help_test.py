@@ -3,7 +3,8 @@
 """The help that ./kerf has of programs and commands before they are built, against their own:  help_test.py ROOT BIN check|write
 
 Of programs, cli/help/kerf-NAME.txt is what NAME --help and the --help of each of its commands print; `write` makes it anew. Of
-./kerf demo and ./kerf stand-in, their help has exactly the options that their Python takes, with a value or without."""
+./kerf demo and ./kerf stand-in, their help has exactly the options that their Python takes, with a value or without. The first
+screen lists the commands of bench and of the lab as their own help does."""
 import pathlib
 import re
 import subprocess
@@ -46,6 +47,14 @@ for page in pages.glob("kerf-*.txt"):
     if what == "check" and not (bin_folder / page.stem).exists():
         wrong.append(f"cli/help/{page.name}: is of no program; remove it")
 
+# The first screen and the help of bench and lab list the same commands.
+first = (pages / "kerf.txt").read_text(encoding="utf-8")
+for name, begin in (("bench", "\nCommands:\n"), ("kerf-lab", "\nSubcommands:\n")):
+    its_own = re.findall(r"^  ([a-z][a-z-]*)  ", (pages / f"{name}.txt").read_text(encoding="utf-8").partition(begin)[2].partition("\n\n")[0], re.M)
+    shown = re.search(rf"^  \./kerf {name.removeprefix('kerf-')} .*: (.*)$", first, re.M)
+    if not shown or shown[1].split() != its_own:
+        wrong.append(f"cli/help/kerf.txt: does not list the commands of {name}.txt: {' '.join(its_own)}")
+
 sys.path.insert(0, str(root / "demo"))
 import options  # noqa: E402
 
@@ -62,7 +71,7 @@ if options_of_help("stand-in") != taken:
 script = (root / "kerf").read_text(encoding="utf-8")
 cases = set(re.findall(r"^  ([a-z][a-z-]*)\)", script.rpartition("\ncase $command in\n")[2], re.M)) - {"help", "lab", "studies"}
 first = (pages / "kerf.txt").read_text(encoding="utf-8")
-shown = set(re.findall(r"^  \./kerf ([a-z-]+) ", first, re.M))
+shown = set(re.findall(r"^  \./kerf ([a-z-]+) ", first, re.M)) - {"lab"}  # a program
 have = {page.stem for page in pages.glob("*.txt") if not page.stem.startswith("kerf")} | {"sweep"}  # of kerf-lab
 if not cases == shown == have:
     wrong.append(f"commands: {sorted(cases)} in ./kerf, {sorted(shown)} on the first screen, {sorted(have)} with a page")

@@ -47,7 +47,7 @@ refused() {
 }
 
 expect 'without a word' gives 0
-expect 'there is the first screen' begins 'kerf: feel, mill and see a tooth'
+expect 'there is the first screen' begins 'kerf: haptic milling of a tooth'
 expect 'of 20 lines' lines_at_most 20
 cp "$lab/said" "$lab/first"
 for words in --help -h help 'help --help' 'help help'; do
@@ -85,7 +85,7 @@ refused 'help dmeo' 'dmeo: unknown; did you mean demo? see ./kerf --help'
 refused --versoin '--versoin: unknown option; did you mean --version? see ./kerf --help'
 refused --fast '--fast: unknown option; see ./kerf --help'
 refused '--version now' '--version: now: unknown; leave it out'
-refused polish "polish: unknown; known are $(sed -nE 's|^  \./kerf ([a-z-]+) .*|\1|p' "$lab/first" | paste -sd ' ') \
+refused polish "polish: unknown; known are $(sed -nE '/kerf lab /d; s|^  \./kerf ([a-z-]+) .*|\1|p' "$lab/first" | paste -sd ' ') \
 arm bridge controller emulator lab record recorder replay studies visualizer-monkey visualizer volume"
 refused kerf "kerf: unknown; known are $(sed 's/.*known are //' "$lab/said")"
 refused ../kerf "../kerf: unknown; known are $(sed 's/.*known are //' "$lab/said")"
@@ -106,7 +106,7 @@ refused 'sweep touch --sett a=1:2:3' 'sweep: --sett: unknown; did you mean --set
 refused 'test shell' 'test: shell: unknown; see ./kerf test --help'
 refused 'test -R' 'test: -R: no value; see ./kerf test --help'
 refused 'test --prest dev' 'test: --prest: unknown; did you mean --preset? see ./kerf test --help'
-refused 'bench' 'bench: no command; take kernels pictures safety bridge stability'
+refused 'bench' 'bench: no command; take kernels pictures safety bridge ranges'
 refused 'bench kernls' 'bench: kernls: unknown; did you mean kernels? see ./kerf bench --help'
 refused 'bench kernels --pagee x' 'bench kernels: --pagee: unknown; did you mean --page? see ./kerf bench kernels --help'
 refused 'stand-in --lokstep -- true' 'stand-in: --lokstep: unknown; did you mean --lockstep? see ./kerf stand-in --help'
@@ -160,7 +160,7 @@ all='arm bench bridge completion controller demo docs doctor emulator identify l
 expect 'Tab offers commands and programs' offers "$all" ''
 expect 'and behind help' offers "$all" help ''
 expect 'or those that begin so' offers 'docs doctor' 'do'
-expect 'what a bench can measure' offers 'bridge kernels pictures safety stability' bench ''
+expect 'what a bench can measure' offers 'bridge kernels pictures ranges safety' bench ''
 expect 'or what begins so' offers 'kernels' bench k
 expect 'the option of the doctor' offers '--demo' doctor ''
 expect 'each option once' offers '--device --help --jobs --out --seconds --set' sweep --

@@ -184,10 +184,7 @@ AovChoice aov_of(const std::string& text, const ViewSettings& settings) {
 void declare_bench(Arguments& app, VisualizerOptions& o) {
   const Option bench = app.flag(
       "--bench", o.bench, "time every renderer, without a controller (512x512 unless --size)");
-  app.option("--page", o.page, "bench: write the table to this Markdown file")
-      .shown_as("FILE")
-      .needs(bench);
-  app.option("--summary", o.summary, "bench: write a short table as its part of this Markdown file")
+  app.option("--page", o.page, "bench: write the tables as their part of this Markdown file")
       .shown_as("FILE")
       .needs(bench);
 }
@@ -215,7 +212,7 @@ PictureSize parse_size(const std::string& text) {
 std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv) {
   VisualizerOptions options;
   Words words;
-  CommandLine app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
+  CommandLine app("Shows the run of a kerf-controller, in a window or as PNG pictures.",
                   "kerf-visualizer", "kerf-visualizer " KERF_VERSION);
   app.footer(footer());
   app.option("--name", options.name, "the controller's name").shows_default();

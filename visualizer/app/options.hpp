@@ -48,9 +48,8 @@ struct VisualizerOptions {
   AovChoice aov;                                  ///< headless: beside each picture
   std::optional<std::filesystem::path> sheet;     ///< headless: the final state by every renderer
   std::optional<std::filesystem::path> report;
-  bool bench = false;                            ///< no controller: what pictures cost here
-  std::optional<std::filesystem::path> page;     ///< bench: as Markdown
-  std::optional<std::filesystem::path> summary;  ///< bench: as a part of a page
+  bool bench = false;                         ///< no controller: what pictures cost here
+  std::optional<std::filesystem::path> page;  ///< bench: as a part of this Markdown file
 };
 
 /// "WxH"; throws VisualizerError.

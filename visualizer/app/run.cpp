@@ -72,8 +72,7 @@ void check_files(const VisualizerOptions& options) {
                  {"--export", mesh, mesh_ending},
                  {"--sheet", path(options.sheet), ".png"},
                  {"--report", path(options.report), ".json"},
-                 {"--page", path(options.page), ".md"},
-                 {"--summary", path(options.summary), ".md"}});
+                 {"--page", path(options.page), ".md"}});
   std::error_code none_there;
   const auto bytes = std::filesystem::file_size(attached, none_there);
   if (none_there || bytes == 0) return;

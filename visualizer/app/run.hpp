@@ -49,9 +49,8 @@ void begin_recording(const VisualizerOptions& options, PictureSize size, std::op
 [[nodiscard]] int run_window(const VisualizerOptions& options);
 
 /// Times every renderer on a volume of its own, without a controller: a table on stdout, all
-/// figures as JSON in `options.report`, a page in `options.page`, the short of it as a part of
-/// `options.summary`. Returns 1 if it was stopped.
-/// Throws VisualizerError or FileError for bad set-up.
+/// figures as JSON in `options.report`, the tables as a part of `options.page`. Returns 1 if it was
+/// stopped. Throws VisualizerError or FileError for bad set-up.
 [[nodiscard]] int run_bench(const VisualizerOptions& options);
 
 }  // namespace kerf

@@ -348,9 +348,8 @@ int run_bench(const VisualizerOptions& options) {
   }
   const std::string report = picture_report(figures);
   if (options.report) write_new_file(*options.report, report);
-  if (options.page) write_new_file(*options.page, make_report({"pictures", "page"}, report));
-  if (options.summary) {
-    write_page_part(*options.summary, "pictures", make_report({"pictures", "summary"}, report));
+  if (options.page) {
+    write_page_part(*options.page, "pictures", make_report({"pictures", "page"}, report));
   }
   std::printf("%s\n%s", figures.gl_renderer.c_str(),
               make_report({"pictures", "tables"}, report).c_str());

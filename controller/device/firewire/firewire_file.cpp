@@ -184,7 +184,7 @@ std::optional<FirewireDevice> identify(const std::string& path, int* refused) {
 
 std::string reason_of(int refused) {
   return "a node cannot be opened (" + std::generic_category().message(refused) + "); " +
-         remedy_for(refused, "give your user the right to it: docs/devices.md");
+         remedy_for(refused, "give your user the right to it: docs/first-hour.md");
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ constexpr SoughtDevice kSought{.name = "WoodenHaptics arm (1234:0006 or 16c0:048
                                .emulation = "--device woodenhaptics --port hid"};
 constexpr const char* kGiveRight =
     "; give your user the right: a udev rule with KERNEL==\"hidraw*\", "
-    "ATTRS{idVendor}==\"1234\", TAG+=\"uaccess\" (docs/devices.md)";
+    "ATTRS{idVendor}==\"1234\", TAG+=\"uaccess\" (docs/first-hour.md)";
 
 [[noreturn]] void refuse(const std::string& where, const std::string& rest) {
   throw std::runtime_error("--port hid" + (where.empty() ? "" : ":" + where) + ": " + rest);

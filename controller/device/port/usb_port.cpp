@@ -25,7 +25,7 @@ constexpr int kInterface = 0;
 constexpr unsigned kTransferMs = 1000;
 constexpr const char* kGiveRight =
     "; give your user the right: a udev rule with ATTRS{idVendor}==\"0403\", "
-    "ATTRS{idProduct}==\"cb48\", TAG+=\"uaccess\" (docs/devices.md)";
+    "ATTRS{idProduct}==\"cb48\", TAG+=\"uaccess\" (docs/first-hour.md)";
 
 // The I/O thread runs above the servo on its core: a packet comes first, and costs some
 // microseconds.

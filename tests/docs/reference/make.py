@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import api
 import exit_codes
 import layouts
 import reports
@@ -28,6 +29,7 @@ def page(text):
 
 
 FILES = {
+    "docs/api.md": lambda *where: page(api.page(*where)),
     "docs/script-keys.md": lambda *where: page(script_keys.page(*where)),
     "docs/segment.md": lambda *where: page(layouts.segment(*where)),
     "docs/wire.md": lambda *where: page(wire.page(*where)),

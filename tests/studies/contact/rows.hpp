@@ -52,7 +52,7 @@ struct Effort {
   [[nodiscard]] static Effort quick() { return {5, 2, 8, 1, 200, 8, {128, 128, 80}, 4, 24, 0, {}}; }
 };
 
-/// F7 (docs/validation.md): random motions at walls.
+/// F7 (docs/contact.md): random motions at walls.
 void measure_walls(const Effort& effort, const RowSink& add_row);
 /// Force in air beside a wall: none, at any speed.
 void measure_air(const Effort& effort, const RowSink& add_row);

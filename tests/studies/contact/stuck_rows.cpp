@@ -367,7 +367,7 @@ struct PressNumber {
 };
 
 /// Presses that stop and are not repaired: each by a tool with a shaft, of which a part that
-/// touches two faces has one plane (docs/validation.md). They are shown, and fail nothing; one that
+/// touches two faces has one plane (docs/contact.md). They are shown, and fail nothing; one that
 /// cuts again does, until it is taken off this list.
 constexpr PressNumber kOpen[] = {{478, 16}, {483, 0}};
 

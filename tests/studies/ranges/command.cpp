@@ -195,7 +195,7 @@ RangesCommand::RangesCommand(Arguments& program)
   app_.option("--numeric", numerics_, "only these numbers of the loop")
       .one_of({kNumericWords.begin(), kNumericWords.end()})
       .split_at_commas();
-  app_.option("--set", set_, "only the scene with this value of a key; may be given often")
+  app_.option("--set", set_, "only the scene with this value of a key; may be repeated")
       .shown_as("TABLE.KEY=VALUE")
       .one_each();
   app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");

@@ -162,24 +162,24 @@ std::string first_words(const std::string& message) {
 
 std::string import_page() {
   std::ostringstream page;
-  page << "# Which files are read\n\n"
-          "Each row is a situation in which a test writes numbered volumes: each voxel has a value "
-          "of its own and a known\nposition in the patient (LPS). Read means that each voxel comes "
-          "back with its value and position. Refused: one line\nsays why, and nothing is "
-          "read. Asked: the line names the option that is missing. The "
-          "test writes the files byte\nby byte from the specifications of the formats "
-          "(`tests/volume/import_truth`), in random sizes, spacings, orientations\nand types; "
-          "`.ci/all import` tries 10,000.\n"
-          "How to import is in [A volume of your own](own-volume.md).\n\n"
-          "This page is made by a test, which fails if it differs:\n\n"
-          "    KERF_WRITE_PAGE=1 build/release/bin/test_volume_readers -tc='*import.md*'\n";
+  page
+      << "## Which files are read\n\n"
+         "Each row is a situation in which a test writes numbered volumes: each voxel has its own "
+         "value "
+         "and a known\nposition in the patient (LPS). *Read*: each voxel comes back with its value "
+         "and position. *Refused*: one line\ngives the reason, and nothing is read. *Asked*: the "
+         "line names the option that is missing. The test writes the\nfiles byte by byte from the "
+         "specifications of the formats (`tests/volume/import_truth`), in random sizes,\nspacings, "
+         "orientations and types; `.ci/all import` tries 10,000. It also makes this part of the "
+         "page:\n\n"
+         "    KERF_WRITE_PAGE=1 build/release/bin/test_volume_readers -tc='*own-volume.md*'\n";
   constexpr std::uint64_t kSeeds = 6;
   std::string format;
   for (std::size_t s = 0; s < situations().size(); ++s) {
     const Situation& situation = situations()[s];
     if (situation.format != format) {
       format = situation.format;
-      page << "\n## " << static_cast<char>(std::toupper(format[0])) << format.substr(1)
+      page << "\n### " << static_cast<char>(std::toupper(format[0])) << format.substr(1)
            << "\n\n| situation | outcome | first words |\n|---|---|---|\n";
     }
     std::string words;

@@ -35,7 +35,7 @@ struct Verdict {
 [[nodiscard]] VoxelIndex voxel_at(const VolumeFrame& frame, const vec3::Vec& lps_mm,
                                   double& apart_mm);
 
-/// The page docs/import.md.
+/// The last part of docs/own-volume.md.
 [[nodiscard]] std::string import_page();
 
 }  // namespace kerf::test

@@ -18,7 +18,7 @@
 
 /// Numbered volumes: each voxel has a value of its own and a known position in the patient. They
 /// are written in each format from its specification, without the libraries that read them, so that
-/// a test can compare value and position of each voxel (`docs/import.md` is made of them).
+/// a test can compare value and position of each voxel (`docs/own-volume.md` is made of them).
 namespace kerf::test {
 
 /// The random choices of one case. The same seed makes the same case.
