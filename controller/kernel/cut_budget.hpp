@@ -62,25 +62,7 @@ template <class N>
   }
 }
 
-/// The drive of the cut: (F_n - F_0) omega / omega_ref in newtons, 0 below the threshold. Fixed: 24
-/// fraction bits, at most 128 N.
-template <class N>
-[[nodiscard]] constexpr typename N::Sum cut_drive(typename N::Real normal_force_n,
-                                                  typename N::Real threshold_n,
-                                                  typename N::Unit spindle_ratio) noexcept {
-  using Sum = typename N::Sum;
-  if (!(normal_force_n > threshold_n) || !(spindle_ratio > typename N::Unit{})) return Sum{};
-  if constexpr (N::kIsFixed) {
-    constexpr std::int64_t kMaxForce = std::int64_t{64} << 16;
-    const std::int64_t force =
-        std::min(std::int64_t{normal_force_n.raw()} - threshold_n.raw(), kMaxForce);
-    const std::int64_t drive = round_shift(force * spindle_ratio.raw(), 16 + 30 - 24);
-    return std::min(drive, (std::int64_t{1} << 31) - 1);
-  } else {
-    return Sum(normal_force_n - threshold_n) * Sum(spindle_ratio);
-  }
-}
-
+/// What a drive (cut_law.hpp) removes in one tick.
 template <class N>
 [[nodiscard]] constexpr CutBudget<N> budget_of(const ForceRate<N>& rate,
                                                typename N::Sum drive) noexcept {

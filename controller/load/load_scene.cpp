@@ -143,6 +143,7 @@ SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched, const Mesh
   SceneTool tool = spec.shape == kMeshShape ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, from)
                                             : load_shape(spec, size, touched.voxel_mm);
   tool.turns = spec.turns;
+  tool.law = spec.law;
   check_shaft(spec, tool, touched.voxel_mm);
   tool.shaft = tool_shaft(spec.shaft, tool.length_mm);
   const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
@@ -334,6 +335,7 @@ void move_materials(double from, double to, std::vector<Material>& materials) {
 void fit_cutting(double grown, double scale, LoadedScene& scene) {
   scene.cut.machinability_mm3_per_s_n *= scale * grown * grown * grown;
   scene.cut.threshold_n /= scale;
+  scene.cut.reference_n /= scale;
   scene.spindle.stall_torque_n_mm *= grown / scale;
   scene.spindle.inertia_g_mm2 *= grown / scale;  // runs up in the same time
 }
@@ -363,6 +365,10 @@ void fit_to_volume(double written_mm, SceneSpec& spec, LoadedScene& scene) {
   }
   scene.device.workspace_scale = scale;
   fit_cutting(grown, scale, scene);
+  for (ToolSpec& tool : spec.tools) {
+    tool.law.saturation_n /= scale;
+    tool.law.wear_half_n_s /= scale;
+  }
 }
 
 /// Index of the tool that a device holds at the start. One that a fitted scene has left out, or

@@ -48,6 +48,12 @@ Json tool_json(const SceneTool& tool) {
                  {"turns", tool.turns},
                  {"size_vox", tool.size_vox},
                  {"offsets_half_pitch", std::move(offsets)}};
+  if (tool.law != BurLaw{}) {
+    object["law"] = {{"force_exponent", tool.law.force_exponent},
+                     {"speed_exponent", tool.law.speed_exponent},
+                     {"saturation_n", tool.law.saturation_n},
+                     {"wear_half_n_s", tool.law.wear_half_n_s}};
+  }
   if (tool.shaft.radius_mm > 0) object["shaft"] = shaft_profile(tool);
   if (tool.mesh.triangles.empty()) {
     object["profile"] = tool_profile(tool);

@@ -35,6 +35,7 @@ class ArmStatistics {
     record_.contact_ticks += output.contact ? 1 : 0;
     record_.shaft_ticks += output.shaft ? 1 : 0;
     record_.peak_force_n = std::max(record_.peak_force_n, vec3::length(output.commanded_force_n));
+    record_.sharpness = output.sharpness;
     record_.absorbed_mj = output.absorbed_mj;
     record_.port_minimum_mj = output.port_minimum_mj;
     std::ranges::transform(output.energy_steps, record_.energy_mj.begin(), energy_mj_of_steps);

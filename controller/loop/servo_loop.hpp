@@ -55,6 +55,7 @@ struct ArmRecord {
   std::uint64_t contact_ticks = 0;
   std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
   double peak_force_n = 0;
+  double sharpness = 1;        ///< of the bur that it holds at the end
   double absorbed_mj = 0;      ///< at the device port, + is taken from the hand
   double port_minimum_mj = 0;  ///< lowest value of it: below 0 the loop gave more than it took
   std::array<double, kEnergySources> energy_mj{};  ///< it by source

@@ -139,6 +139,7 @@ class CompiledSceneOf final : public CompiledScene {
     plan.round = tool.round;
     plan.turns = tool.turns;
     plan.rim_mm = typename N::Real(tool.radius_mm);
+    if (plan_.force_cut.on) plan.law = plan_law<N>(scene, tool);
     plan.steepness = bearing_steepness<N>(tool, plan_.contact);
     plan.offsets = memory_.hold_samples(tool);
     if (plan_.contact.swept) {

@@ -50,6 +50,19 @@ template <class N>
   return rounded<typename N::Ratio, WorldSpace, VoxelSpace>(m);
 }
 
+/// The law by which force and speed of this tool cut.
+template <class N>
+[[nodiscard]] CutLaw<N> plan_law(const LoadedScene& scene, const SceneTool& tool) {
+  const BurLaw& bur = tool.law;
+  return cut_law<N>({.threshold_n = scene.cut.threshold_n,
+                     .reference_n = scene.cut.reference_n,
+                     .force_exponent = bur.force_exponent,
+                     .speed_exponent = bur.speed_exponent,
+                     .largest_n = bur.saturation_n,
+                     .wear_half_n_s = bur.wear_half_n_s},
+                    scene.servo.rate_hz);
+}
+
 /// For a `LoadPlane`.
 template <class N>
 [[nodiscard]] typename N::Ratio bearing_steepness(const SceneTool& tool,
@@ -80,7 +93,6 @@ template <class N>
   cut.on = scene.cut.model == CutModel::preston;
   if (!cut.on) return cut;
   constexpr double kDeeperPerS = 100, kBackPerS = 1;  // units: there in 10 ms, back in a second
-  cut.threshold_n = typename N::Real(scene.cut.threshold_n);
   cut.deeper_step = typename N::Real(kDeeperPerS / scene.servo.rate_hz);
   cut.back_step = typename N::Real(kBackPerS / scene.servo.rate_hz);
   cut.spindle = plan_spindle<N>(scene);

@@ -138,7 +138,9 @@ class WorstCaseDriver {
   WorstTick time_here(int ticks) {
     // A little above the threshold below which nothing is cut.
     const DeviceVec<Real> press_n{
-        {}, (plan_->force_cut.threshold_n + Real(0.05)) * plan_->workspace_scale, {}};
+        {},
+        (plan_->tools[state_.active_tool].law.threshold_n + Real(0.05)) * plan_->workspace_scale,
+        {}};
     std::vector<double> us;
     std::vector<std::int64_t> queried;
     for (int i = 0; i < ticks; ++i) {

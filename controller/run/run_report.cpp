@@ -66,6 +66,16 @@ std::string score_lines(const MaterialScores& materials) {
   return text;
 }
 
+/// The wear of the burs in the hands.
+std::string bur_line(const RunReport& report) {
+  const RunRecord& r = report.record;
+  const bool second = report.second && r.second.sharpness < 1;
+  if (r.sharpness == 1 && !second) return {};
+  std::string text = format("  bur        cuts at %.0f %% of its first rate", 100 * r.sharpness);
+  if (report.second) text += format(", the second arm's at %.0f %%", 100 * r.second.sharpness);
+  return text + "\n";
+}
+
 /// A scan is larger than the workspace: its tool, and what it removes, are so, too.
 std::string scale_line(const RunReport& report) {
   if (report.workspace_scale <= 1) return {};
@@ -113,6 +123,7 @@ Json second_json(const ArmReport& arm, const ArmRecord& r) {
           {"contact_ticks", r.contact_ticks},
           {"shaft_ticks", r.shaft_ticks},
           {"peak_force_n", r.peak_force_n},
+          {"sharpness", r.sharpness},
           {"energy_j", r.absorbed_mj / 1000.0},
           {"port_minimum_j", r.port_minimum_mj / 1000.0},
           {"energy_by_source_j", by_source(r)},
@@ -180,6 +191,7 @@ std::string report_json(const RunReport& report) {
       {"removed_mm3_by_material", removed_of(report.materials)},
       {"removed_density_mm3", report.removed_density_mm3},
       {"forbidden_ms", forbidden_of(report.materials)},
+      {"sharpness", r.sharpness},
       {"resets", r.resets},
       {"undos", r.undos},
       {"redos", r.redos},
@@ -226,7 +238,7 @@ std::string summary(const RunReport& report) {
   if (r.resets > 0) {
     text += format(" since the last of %llu resets", static_cast<unsigned long long>(r.resets));
   }
-  text += "\n" + score_lines(report.materials) + scale_line(report);
+  text += "\n" + score_lines(report.materials) + bur_line(report) + scale_line(report);
   text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
                  static_cast<unsigned long long>(r.stale_ticks),
                  static_cast<unsigned long long>(r.overruns),

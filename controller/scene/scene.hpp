@@ -116,6 +116,26 @@ enum class CutPedal : std::uint8_t {
   button  ///< while the device's first button is pressed
 };
 
+/// Diamond grit of a bur. It chooses the law by which the bur cuts (docs/cutting.md).
+enum class Grit : std::uint8_t { none, medium, coarse, super_coarse };
+
+/// How press and speed of a bur become removal, beside the machinability of what it cuts
+/// (docs/theory.md 6.1). As it is here: Preston's law.
+struct BurLaw {
+  double force_exponent = 1;  ///< a
+  double speed_exponent = 1;  ///< b
+  double saturation_n = 0;    ///< a higher press removes no more; 0: there is no such press
+  double wear_half_n_s = 0;   ///< press times time after which the rate has halved; 0: no wear
+
+  friend bool operator==(const BurLaw&, const BurLaw&) = default;
+};
+
+/// The law of a [[tool]] as written; what is empty is that of the grit.
+struct BurSettings {
+  Grit grit = Grit::none;
+  std::optional<double> force_exponent, speed_exponent, saturation_n, wear_half_n_s;
+};
+
 /// The filter against a volume's noise: a word, or how many passes of it.
 enum class Denoise : std::int8_t { automatic = -1, off = 0 };
 inline constexpr std::array<std::string_view, 2> kDenoiseWords = {"auto", "off"};
@@ -164,6 +184,9 @@ struct CutSettings {
   double machinability_mm3_per_s_n = kEnamelMm3PerSN;
   double threshold_n = 0.05;
   double friction = 0.5;
+  /// Press at which a bur removes as much as by Preston's law, whatever its exponent: 1 N at the
+  /// device once `fit` has changed the scene's forces.
+  double reference_n = 1;
 };
 
 /// [spindle]: turns the tool in the model preston; an air turbine.
@@ -245,6 +268,10 @@ struct ToolSpec {
   ToolSize size;
   ShaftSize shaft;
   std::string shaft_location;  ///< begins complaints about the shaft
+  BurSettings bur_settings;
+  BurLaw law;  ///< that of the settings
+  std::string
+      law_location;  ///< of a setting of the law, to complain about it; empty: there is none
   bool turns = true;
 };
 
@@ -268,6 +295,8 @@ inline constexpr std::array<std::string_view, 3> kForceModelWords = {"paper", "p
 inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
                                                                    "overlap_exact", "preston"};
 inline constexpr std::array<std::string_view, 3> kCutPedalWords = {"auto", "always", "button"};
+inline constexpr std::array<std::string_view, 4> kGritWords = {"none", "medium", "coarse",
+                                                               "super-coarse"};
 inline constexpr std::array<std::string_view, 2> kNumericWords = {"fixed", "double"};
 inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "sobel5", "farid"};
 

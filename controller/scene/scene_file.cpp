@@ -231,6 +231,22 @@ void check_shaft(const SceneTable& table, ToolSpec& tool) {
   if (shaft.length_mm) tool.shaft_location = table.location("shaft_length_mm");
 }
 
+/// The grit's law with the keys of the table in place of its values.
+void settle_law(const SceneTable& table, ToolSpec& tool) {
+  const BurSettings& own = tool.bur_settings;
+  tool.law = grit_law(own.grit);
+  const auto settle = [&](const char* key, const std::optional<double>& given, double& value) {
+    if (!given) return;
+    value = *given;
+    tool.law_location = table.location(key);
+  };
+  if (own.grit != Grit::none) tool.law_location = table.location("grit");
+  settle("force_exponent", own.force_exponent, tool.law.force_exponent);
+  settle("speed_exponent", own.speed_exponent, tool.law.speed_exponent);
+  settle("wear_half_n_s", own.wear_half_n_s, tool.law.wear_half_n_s);
+  settle("saturation_n", own.saturation_n, tool.law.saturation_n);
+}
+
 void finish_volume(const SceneTable& table, VolumeSpec& volume) {
   volume.where = table.where("file");
   if (!table.has("name")) volume.name = stem_of(volume.file);
@@ -255,6 +271,7 @@ void finish_tool(const SceneTable& table, ToolSpec& tool) {
                       : number_text(tool.size.radius_mm) + " mm");
   }
   check_shaft(table, tool);
+  settle_law(table, tool);
   tool.pitch_given = table.has("pitch_mm");
   if (tool.pitch_given) tool.pitch_location = table.location("pitch_mm");
   if (!table.has("name")) tool.name = name;
@@ -313,6 +330,22 @@ void refuse_uncut(const SceneSpec& scene) {
     refuse(scene.path, ": material " + material.name +
                            " is forbidden, and this cut.model cuts everything; set model "
                            "= \"preston\", or leave forbidden out");
+  }
+}
+
+/// Without cutting by force a bur needs no law; with it, there has to be a force that cuts.
+void refuse_idle_laws(const SceneSpec& scene) {
+  for (const ToolSpec& tool : scene.tools) {
+    if (tool.law_location.empty()) continue;
+    if (scene.cut.model != CutModel::preston) {
+      refuse(tool.law_location,
+             " is of cutting by force; set cut.model = \"preston\", or leave it out");
+    }
+    if (tool.law.saturation_n > 0 && tool.law.saturation_n <= scene.cut.threshold_n) {
+      refuse(tool.law_location, " leaves no force that cuts: cut.threshold_n is " +
+                                    number_text(scene.cut.threshold_n) +
+                                    "; use a lower threshold, or a saturation_n above it");
+    }
   }
 }
 
@@ -581,6 +614,7 @@ SceneSpec read_scene(const TomlNode& root, const TomlNode* second,
   scene.limit_places = limit_places(tables.once("limits"));
   settle_device(scene);
   refuse_uncut(scene);
+  refuse_idle_laws(scene);
   refuse_unfelt(scene);
   finish_hand(tables, path, scene.hand_script, scene.hand_location);
   return std::move(parts.scene);

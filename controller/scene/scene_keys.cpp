@@ -108,9 +108,9 @@ template <class Part, class T>
 Part& part_with(T Part::*, SceneParts& parts) {
   SceneSpec& scene = parts.scene;
   return std::get<Part&>(std::tie(parts.volume, parts.tool, parts.tool.size, parts.tool.shaft,
-                                  parts.material, static_cast<SceneSettings&>(scene), scene.device,
-                                  scene.force, scene.cut, scene.spindle, scene.limits,
-                                  scene.servo));
+                                  parts.tool.bur_settings, parts.material,
+                                  static_cast<SceneSettings&>(scene), scene.device, scene.force,
+                                  scene.cut, scene.spindle, scene.limits, scene.servo));
 }
 
 template <auto kMember>
@@ -225,6 +225,20 @@ constexpr SceneKey kKeys[] = {
      {}, {.default_text = "none"}},
     {"tool.handpiece_length_mm", "mm", at<&ShaftSize::handpiece_length_mm>, between(1e-4, 1000),
      "of the handpiece", {}, {.default_text = "its radius"}},
+    {"tool.grit", "", at<&BurSettings::grit>, one_of(kGritWords),
+     "diamond grit, with its law of force, speed and wear (docs/cutting.md); none: Preston's law, no wear"},
+    {"tool.force_exponent", "", at<&BurSettings::force_exponent>, between(0.1, 2),
+     "the rate goes with the force above cut.threshold_n to this power; at 1 N all powers cut alike",
+     {}, {.default_text = "the grit's: 1"}},
+    {"tool.speed_exponent", "", at<&BurSettings::speed_exponent>, between(0, 2),
+     "the rate goes with the spindle's speed to this power; below 2,344/min at least in proportion",
+     {}, {.default_text = "the grit's: 1, with a grit 0"}},
+    {"tool.saturation_n", "N", at<&BurSettings::saturation_n>, between(0.1, 100),
+     "a higher force removes no more; above cut.threshold_n",
+     {}, {.default_text = "the grit's: medium 0.98, else none"}},
+    {"tool.wear_half_n_s", "N s", at<&BurSettings::wear_half_n_s>, between(1, 1e9),
+     "force times time of cutting after which the rate has halved; three times it leaves a quarter",
+     {}, {.default_text = "the grit's: 110, 170, 260; else no wear"}},
     {"tool.turns", "", at<&ToolSpec::turns>, {}, "with the stylus; else it keeps the world's axes"},
 
     {"material.name", "", at<&Material::name>, {},

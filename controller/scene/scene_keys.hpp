@@ -31,7 +31,7 @@ using SceneSlot =
     std::variant<bool*, int*, double*, std::string*, std::array<double, 3>*, std::optional<int>*,
                  std::optional<double>*, std::optional<std::array<double, 2>>*,
                  std::optional<std::array<double, 3>>*, std::optional<std::array<double, 4>>*,
-                 std::optional<VoxelGrid>*, Personality*, ForceModel*, CutModel*, CutPedal*,
+                 std::optional<VoxelGrid>*, Personality*, ForceModel*, CutModel*, CutPedal*, Grit*,
                  NumericKind*, GradientKernel*, Denoise*, LawChoice*>;
 
 /// Both ends are allowed values.

@@ -2,6 +2,7 @@
 #include "controller/scene/scene_presets.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <iterator>
 #include <optional>
@@ -25,7 +26,8 @@ const std::vector<Material>& all_known() {
       {.name = "pulp", .iso = 0.14, .machinability = 10.0, .colour = {0.70, 0.25, 0.22}},
       {.name = "bone", .iso = 0.40, .machinability = 4.0, .colour = {0.89, 0.83, 0.68}},
       {.name = "caries", .iso = 0.25, .machinability = 6.0, .colour = {0.42, 0.28, 0.14}},
-      {.name = "amalgam", .iso = 0.90, .machinability = 2.5, .colour = {0.55, 0.56, 0.58}}};
+      {.name = "amalgam", .iso = 0.90, .machinability = 2.5, .colour = {0.55, 0.56, 0.58}},
+      {.name = "glass_ceramic", .iso = 0.90, .machinability = 53.0, .colour = {0.88, 0.87, 0.85}}};
   return kMaterials;
 }
 
@@ -39,6 +41,15 @@ Material known_material(std::string_view name) {
   const auto known = std::find_if(all_known().begin(), all_known().end(),
                                   [&](const Material& m) { return m.name == name; });
   return known == all_known().end() ? Material{.name = std::string(name)} : *known;
+}
+
+BurLaw grit_law(Grit grit) {
+  constexpr BurLaw kMedium{.speed_exponent = 0, .saturation_n = 0.98, .wear_half_n_s = 110};
+  constexpr BurLaw kCoarse{.speed_exponent = 0, .wear_half_n_s = 170};
+  constexpr BurLaw kSuperCoarse{.speed_exponent = 0, .wear_half_n_s = 260};
+  constexpr std::array<BurLaw, kGritWords.size()> kLaws = {BurLaw{}, kMedium, kCoarse,
+                                                           kSuperCoarse};
+  return kLaws.at(static_cast<std::size_t>(grit));
 }
 
 Material label_material(std::size_t label, double iso) {

@@ -58,4 +58,7 @@ inline constexpr double kShankOutMm = 8;
 /// LoadError for an unknown bur, and if the table names a shape or a size beside it.
 void spell_out_burs(TomlNode& root, const std::string& file);
 
+/// The law of a diamond grit; docs/cutting.md has the sources. Load time.
+[[nodiscard]] BurLaw grit_law(Grit grit);
+
 }  // namespace kerf

@@ -192,7 +192,10 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
   const auto normal = transposed(spindle_axes(tool, state, at)) * at.normal;
   CuttingFriction<N> friction;
   const auto ratio = state.pedal_down ? state.force_cut.spindle.ratio : typename N::Unit{};
-  const auto drive = cut_drive<N>(cut.normal_force_n, rules.threshold_n, ratio);
+  BurWear<N>& wear = state.force_cut.wear[state.active_tool];
+  const auto sharp = cut_drive<N>(tool.law, cut.normal_force_n, ratio);
+  const auto drive = wear.left_of(sharp, tool.law);
+  if (covered.whole > 0) wear.add(sharp);
   bool starves = drive > 0 && !meets_press(plan, state, covered);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     if (covered.in[v].list.empty() || !(covered.whole > 0)) continue;

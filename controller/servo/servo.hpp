@@ -75,6 +75,7 @@ struct ServoOutput {
   double press_n = 0;        ///< normal force that cuts, in the scene
   double spindle_ratio = 0;  ///< speed over the reference speed, in this tick's cut
   double spindle_load = 0;   ///< torque over the stall torque
+  double sharpness = 1;      ///< rate of the bur over that of a new one, before this tick's cut
   std::uint32_t active_tool = 0;
   std::int64_t samples_read = 0;    ///< of the tool's surface, by contact (sample_reader.hpp)
   std::uint64_t removed_steps = 0;  ///< density steps removed in this tick, all volumes

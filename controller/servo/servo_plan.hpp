@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "controller/kernel/covered_voxels.hpp"
+#include "controller/kernel/cut_law.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
@@ -175,7 +176,6 @@ inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
 template <class N>
 struct ForceCutPlan {
   bool on = false;
-  typename N::Real threshold_n{};  ///< force in the scene that cuts nothing yet
   typename N::Real deeper_step{};  ///< of the advance in a tick that covers too little, units
   typename N::Real back_step{};    ///< of the advance in any other
   SpindlePlan<N> spindle;
@@ -234,6 +234,7 @@ struct ToolPlan {
   bool turns = true;              ///< rotates with the stylus; else keeps the world's axes
   typename N::Real rim_mm{};      ///< largest radius about the shaft
   typename N::Ratio steepness{};  ///< of its contacts' loads (covered_voxels.hpp)
+  CutLaw<N> law;                  ///< if force cuts
   SweptTool<N> swept;             ///< for the swept proxy
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };

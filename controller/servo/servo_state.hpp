@@ -53,10 +53,11 @@ struct ForceCutState {
   SpindleState<N> spindle;
   Vec<typename N::Real, ToolSpace> friction_n;  ///< for the next tick, force in the scene
   std::array<PrestonState<N>, kMaxVolumes> volume{};
+  std::array<BurWear<N>, kMaxTools> wear{};                    ///< of each tool, in the hand or not
   std::array<std::span<CoveredEntry<N>>, kMaxVolumes> list{};  ///< scratch of one tick
 
-  /// Resets the state for a new tool, which stands still and has cut nothing. Keeps the budgets of
-  /// the materials.
+  /// Resets the state for a new tool, which stands still. Keeps the budgets of the materials, and
+  /// the wear of all tools.
   constexpr void change_tool() noexcept {
     advance = typename N::Real(kCutAdvance);
     spindle = {};

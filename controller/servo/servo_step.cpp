@@ -329,6 +329,15 @@ void update_energy(ServoState<N>& state, const ForceRequest<N>& wanted, bool mot
   state.ledger.send(parts);
 }
 
+/// Of the bur in the hand.
+template <class N>
+double sharpness_of(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept {
+  const CutLaw<N>& law = plan.tools[state.active_tool].law;
+  const BurWear<N>& wear = state.force_cut.wear[state.active_tool];
+  return static_cast<double>(wear.sharpness(law)) /
+         static_cast<double>(BurWear<N>{}.sharpness(law));
+}
+
 /// Cuts by the force that was sent. The spindle runs while the motors hold the hand and the pedal,
 /// if there is one, is down; with the pedal up nothing is cut, though the spindle runs down.
 template <class N>
@@ -336,6 +345,7 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ContactResult<N>&
          ServoOutput& out) noexcept {
   if (!plan.force_cut.on) return;
   out.spindle_ratio = as_double(state.force_cut.spindle.ratio);
+  out.sharpness = sharpness_of(plan, state);
   const bool runs = state.supervisor.motors_on() && !state.held() && state.pedal_down;
   const ForceCut<N> done = cut_by_sent_force(plan, state, contact, state.force_n, runs);
   out.press_n = as_double(done.normal_force_n);

@@ -140,6 +140,7 @@ void restore_some(Arms<N> arms, std::array<VoxelBox, kMaxVolumes>& changed) noex
   for (int looks = kBlocksPerTick; looks > 0; --looks) {
     if (reset.volume == plan.volume_count) {
       reset = {};
+      for (const Arm<N>& arm : arms) arm.state->force_cut.wear = {};  // new burs
       end_restoring(arms);
       return;
     }

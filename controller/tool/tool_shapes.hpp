@@ -39,6 +39,7 @@ struct SceneTool {
   std::vector<ToolOffset> offsets;
   ToolMesh mesh;  ///< of the shape "stl"; else empty, as the shape defines the tool
   ToolShaft shaft;
+  BurLaw law;
 };
 
 inline constexpr std::int32_t kMaxToolSide = 64;  ///< pitches; larger sums leave the kernels' range

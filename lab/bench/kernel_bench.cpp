@@ -7,6 +7,7 @@
 #include <span>
 
 #include "controller/kernel/covered_voxels.hpp"
+#include "controller/kernel/cut_law.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/overlap_methods.hpp"
 #include "controller/kernel/preston.hpp"
@@ -162,7 +163,7 @@ class Bench {
     });
     PrestonPlan<Numbers> plan;
     plan.rate.fill(force_rate<Numbers>(kEnamelSteps));
-    const auto drive = cut_drive<Numbers>(Q16(1), Q16(0), Q30(1));
+    const auto drive = cut_drive<Numbers>({}, Q16(1), Q30(1));
     const auto cut = [&](auto covered, std::vector<Density>& volume, PrestonState<Numbers>& state) {
       const auto out = cut_by_force(plan, drive, std::span<Density>(volume), state, covered);
       use(static_cast<std::int64_t>(out.removed.density_steps));

@@ -174,6 +174,32 @@ struct CirclePoint {
   return std::sqrt(x * x + y * y + z * z);
 }
 
+/// base^exponent for base > 0, exponent within +-4 and a result within 2^+-500: within 1e-14 of it,
+/// relatively. 0 for a base that is not positive.
+[[nodiscard]] constexpr double power(double base, double exponent) noexcept {
+  if (!(base > 0)) return 0;
+  int octaves = 0;
+  for (; base > 1.5; base /= 2) ++octaves;
+  for (; base < 0.75; base *= 2) --octaves;
+  // ln base = 2 artanh z, |z| <= 0.2; the series ends below 1e-17.
+  const double z = (base - 1) / (base + 1), square = z * z;
+  double ln_half = 0, odd = z;
+  for (int n = 1; n < 24; n += 2, odd *= square) ln_half += odd / n;
+  const double ln = exponent * (octaves * std::numbers::ln2 + 2 * ln_half);
+  // exp of what is left of whole octaves, at most ln 2 / 2.
+  const double wanted = ln / std::numbers::ln2;
+  const auto whole = static_cast<int>(wanted < 0 ? wanted - 0.5 : wanted + 0.5);
+  const double rest = ln - whole * std::numbers::ln2;
+  double result = 1, term = 1;
+  for (int n = 1; n < 18; ++n) {
+    term *= rest / n;
+    result += term;
+  }
+  for (int i = 0; i < whole; ++i) result *= 2;
+  for (int i = 0; i > whole; --i) result /= 2;
+  return result;
+}
+
 /// 10^-digits, the nearest double up to 22 digits; 0 from 309 on. `digits` may be negative.
 [[nodiscard]] constexpr double power_of_tenth(int digits) noexcept {
   constexpr int kOverflow = 309;

@@ -5,6 +5,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/kernel/cut_law.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/overlap_methods.hpp"
 #include "controller/kernel/preston.hpp"
@@ -143,7 +144,7 @@ constexpr std::uint64_t cut_by_largest_force() {
   }
   PrestonState<N> state;
   std::array<CoveredVoxel<N>, 64> memory{};
-  const auto drive = cut_drive<N>(Q16(32767), Q16(0), Q30(1.99));
+  const auto drive = cut_drive<N>({}, Q16(32767), Q30(1.99));
   std::uint64_t steps = 0;
   for (int tick = 0; tick < 3; ++tick) {
     auto voxels =

@@ -51,7 +51,7 @@ class Press {
         double force_n)
       : volume_(volume),
         labels_(std::move(labels)),
-        drive_(cut_drive<N>(Q16(force_n), Q16(0), Q30(0.9))) {
+        drive_(cut_drive<N>({}, Q16(force_n), Q30(0.9))) {
     plan_.rate.fill(force_rate<N>(20000));
     plan_.rate[2] = force_rate<N>(0.7);
     plan_.rate[3] = {};

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "controller/kernel/cut_law.hpp"
 #include "controller/kernel/preston.hpp"
 #include "tests/kernel/support.hpp"
 
@@ -82,8 +83,10 @@ struct PrestonRig {
                                      plan.labels, cutter.overlap,
                                      frame_at<N>(centre_vox, rim_vox, axis), std::span(memory));
     Pressed<N> pressed{{}, covered.drag, touched_forbidden(plan, covered) != 0};
-    const auto drive = cut_drive<N>(typename N::Real(force_n), typename N::Real(threshold_n),
-                                    typename N::Unit(ratio));
+    law.threshold_n = typename N::Real(threshold_n);
+    const auto sharp = cut_drive<N>(law, typename N::Real(force_n), typename N::Unit(ratio));
+    const auto drive = wear.left_of(sharp, law);
+    wear.add(sharp);
     static_cast<PrestonOutcome<N>&>(pressed) =
         cut_by_force(plan, drive, std::span<Density>(volume.density), state, covered);
     return pressed;
@@ -97,6 +100,8 @@ struct PrestonRig {
   Axis axis = Axis::y;
   Scale scale;
   PrestonPlan<N> plan;
+  CutLaw<N> law;
+  BurWear<N> wear;
   PrestonState<N> state;
   std::vector<CoveredVoxel<N>> memory;
   Cutter<N> cutter;

@@ -112,6 +112,64 @@ TEST_CASE("what cutting by force needs and its scene lacks is refused") {
         }).starts_with("block.toml: cut.model = \"preston\" needs the normal force of a proxy; "));
 }
 
+TEST_CASE("a bur has the law of its grit, and its own keys in place of the grit's") {
+  const auto law_of = [](const std::string& keys) { return parse(keys).tools[0].law; };
+  CHECK(law_of("") == BurLaw{});
+  CHECK(law_of("grit = \"none\"\n") == BurLaw{});
+  const BurLaw medium = law_of("grit = \"medium\"\n");
+  CHECK(medium.force_exponent == 1);
+  CHECK(medium.speed_exponent == 0);
+  CHECK(medium.saturation_n == 0.98);
+  CHECK(medium.wear_half_n_s == 110);
+  const BurLaw coarse = law_of("grit = \"coarse\"\n");
+  CHECK(coarse.saturation_n == 0);
+  CHECK(coarse.wear_half_n_s > medium.wear_half_n_s);
+  CHECK(law_of("grit = \"super-coarse\"\n").wear_half_n_s > coarse.wear_half_n_s);
+  const BurLaw own = law_of(
+      "grit = \"medium\"\nforce_exponent = 0.5\nspeed_exponent = 0.29\nsaturation_n = 2\n"
+      "wear_half_n_s = 50\n");
+  CHECK(own ==
+        BurLaw{
+            .force_exponent = 0.5, .speed_exponent = 0.29, .saturation_n = 2, .wear_half_n_s = 50});
+}
+
+TEST_CASE("a law that no bur has, or that has no effect, is refused in one line") {
+  const auto complaint = [](const std::string& keys) {
+    const std::string error = error_after(keys);
+    CHECK(error.find('\n') == std::string::npos);
+    return error;
+  };
+  for (const char* value : {"0", "3", "-1", "nan", "1e400"}) {
+    CAPTURE(std::string(value));
+    const std::string exponent = std::string("force_exponent = ") + value + "\n";
+    CHECK(complaint(exponent).starts_with("x.toml:6:"));
+    CHECK_FALSE(complaint("wear_half_n_s = " +
+                          std::string(value == std::string("3") ? "0.5" : value) + "\n")
+                    .empty());
+  }
+  CHECK(complaint("force_exponent = 3\n")
+            .starts_with("x.toml:6: tool.force_exponent = 3 is out of range"));
+  CHECK(complaint("force_exponent = 0\n").ends_with("use 0.1 to 2"));
+  CHECK(complaint("speed_exponent = 3\n").ends_with("use 0 to 2"));
+  CHECK(complaint("wear_half_n_s = 0\n").find("; use 1 to ") != std::string::npos);
+  CHECK(complaint("saturation_n = 0\n").ends_with("use 0.1 to 100"));
+  CHECK(complaint("grit = \"fine\"\n").starts_with("x.toml:6: tool.grit = \"fine\""));
+  CHECK(complaint("saturation_n = 0.1\n[cut]\nthreshold_n = 0.2\n") ==
+        "x.toml:6: tool.saturation_n = 0.1 leaves no force that cuts: cut.threshold_n is 0.2; use "
+        "a lower threshold, or a saturation_n above it");
+  CHECK(complaint("grit = \"medium\"\n" + kOverlap) ==
+        "x.toml:6: tool.grit = \"medium\" is of cutting by force; set cut.model = \"preston\", or "
+        "leave it out");
+}
+
+TEST_CASE("the scene's identity holds the law of a bur that has one, and is else as ever") {
+  LoadedScene scene = block_scene();
+  const std::string before = canonical_json(scene);
+  CHECK(before.find("speed_exponent") == std::string::npos);
+  scene.tools[0].law.wear_half_n_s = 50;
+  CHECK(canonical_json(scene) != before);
+}
+
 TEST_CASE("the scene's identity holds what its model of cutting uses, and nothing else") {
   LoadedScene scene = block_scene();
   const std::string before = canonical_json(scene);
@@ -175,7 +233,7 @@ TEST_CASE_TEMPLATE("the tables cut a block: each material at its rate, at the sa
     Transform<typename N::Unit, WorldSpace, ToolSpace> upright;
     for (std::size_t axis = 0; axis < 3; ++axis) upright.row[axis][axis] = typename N::Unit(1);
     const SpindleFrame<N> frame{pose.centre_vox, rims_from_voxel<N>(tool, volume), upright};
-    const auto drive = cut_drive<N>(Real(1.05), Real(scene.cut.threshold_n), typename N::Unit(1));
+    const auto drive = cut_drive<N>(plan_law<N>(scene, tool), Real(1.05), typename N::Unit(1));
     PrestonState<N> state;
     std::size_t largest = 0;
     for (int i = 0; i < rate_hz / 10; ++i) {

@@ -20,8 +20,8 @@ def run(*words):
     return subprocess.run(words, capture_output=True, text=True, timeout=600, check=False, env=ENVIRONMENT)
 
 
-def demo(out, *words):
-    done = run(ROOT + "/kerf", "demo", "--headless", "--size", "160x120", "--virtual", "--scene", "two_arms", "--out", out, *words)
+def demo(out, *words, scene="two_arms"):
+    done = run(ROOT + "/kerf", "demo", "--headless", "--size", "160x120", "--virtual", "--scene", scene, "--out", out, *words)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -92,6 +92,29 @@ class TestTwoArms(unittest.TestCase):
         done = run(PROGRAMS + "/kerf-replay", copy)
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("arm 2, ", done.stdout)
+
+    def test_burs_that_wear_replay_to_the_same_bits_each_by_its_own_wear(self):
+        scenes = pathlib.Path(self.folder.name, "scenes")
+        shutil.copytree(ROOT + "/scenes", scenes, dirs_exist_ok=True)
+        scene = scenes / "two_arms.toml"
+        text = scene.read_text()
+        tool = "[[tool]]\n"
+        scene.write_text(text.replace(tool, tool + 'grit = "medium"\nwear_half_n_s = 1\n'))
+        out = os.path.join(self.folder.name, "worn")
+        code, said = demo(out, "--seconds", "2.5", scene=str(scene))
+        self.assertEqual(code, 0, said)
+        report = json.loads(pathlib.Path(out, "report.json").read_text())
+        first, second = report["sharpness"], report["second"]["sharpness"]
+        self.assertTrue(0.2 < first < 0.9 and 0.2 < second < 0.9 and first != second, (first, second))
+        self.assertLess(report["removed_mm3"], self.report["removed_mm3"])
+        self.assertEqual((self.report["sharpness"], self.report["second"]["sharpness"]), (1, 1))
+        replay = os.path.join(self.folder.name, "worn.json")
+        done = run(PROGRAMS + "/kerf-replay", out + "/log", "--report", replay)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        replayed = json.loads(pathlib.Path(replay).read_text())
+        self.assertEqual(replayed["output_hash"], report["output_hash"])
+        self.assertEqual(replayed["second_output_hash"], report["second"]["output_hash"])
+        self.assertEqual(replayed["volume_hash"], report["volume_hash"])
 
     def test_a_cut_log_of_the_second_arm_is_reported_by_every_export_and_plot(self):
         copy = os.path.join(self.folder.name, "cut")

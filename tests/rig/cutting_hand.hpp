@@ -17,7 +17,8 @@
 namespace kerf::extremes {
 
 /// A servo that cuts by force, led by a hand that ignores it, and the two sides of its balance: the
-/// volume removed, and SUM G F T of material without a label.
+/// volume removed, and that of material without a label by the law of the bur, SUM G F T of
+/// Preston's.
 class CuttingHand {
  public:
   /// From the inkwell around the solid and down on `start_mm`; the force is faded in
@@ -25,6 +26,8 @@ class CuttingHand {
   explicit CuttingHand(LoadedScene scene, const std::array<double, 3>& start_mm = {0, 1.3, 0})
       : tick_s_(1.0 / scene.servo.rate_hz),
         threshold_n_(scene.cut.threshold_n),
+        reference_n_(scene.cut.reference_n),
+        law_(scene.tools[scene.active_tool].law),
         machinability_(scene.cut.machinability_mm3_per_s_n) {
     for (const SceneVolume& volume : scene.volumes) {
       const auto& h = volume.image.spacing_mm;
@@ -53,8 +56,10 @@ class CuttingHand {
     for (std::size_t v = 0; v < mm3_per_step_.size(); ++v) {
       removed_mm3_ += mm3_per_step_[v] * static_cast<double>(out.removed_by_volume[v]);
     }
-    fed_mm3_ +=
-        machinability_ * std::max(0.0, out.press_n - threshold_n_) * out.spindle_ratio * tick_s_;
+    const double drive_n = drive_of(out);
+    const double sharp = law_.wear_half_n_s > 0 ? 1 / (1 + worn_n_s_ / law_.wear_half_n_s) : 1;
+    fed_mm3_ += machinability_ * drive_n * sharp * tick_s_;
+    worn_n_s_ += drive_n * tick_s_;
     return out;
   }
   /// Along a line from the hand's position, at 1 m/s.
@@ -78,7 +83,18 @@ class CuttingHand {
   [[nodiscard]] double fed_mm3() const { return fed_mm3_; }
 
  private:
-  double tick_s_, threshold_n_, machinability_;
+  /// Of a bur without wear. The spindle is up to speed.
+  [[nodiscard]] double drive_of(const ServoOutput& out) const {
+    const double most_n = law_.saturation_n > 0 ? law_.saturation_n : out.press_n;
+    const double above_n = std::min(out.press_n, most_n) - threshold_n_;
+    if (above_n <= 0) return 0;
+    return reference_n_ * std::pow(above_n / reference_n_, law_.force_exponent) *
+           std::pow(out.spindle_ratio, law_.speed_exponent);
+  }
+
+  double tick_s_, threshold_n_, reference_n_, worn_n_s_ = 0;
+  BurLaw law_;
+  double machinability_;
   std::vector<double> mm3_per_step_;
   std::unique_ptr<AnyServo> servo_;
   KinematicOmni arm_;

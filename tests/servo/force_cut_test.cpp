@@ -69,6 +69,34 @@ TEST_CASE("what the servo removes is the integral of G F") {
   }
 }
 
+TEST_CASE("what the servo removes is the integral of its bur's law, saturated and worn") {
+  constexpr BurLaw kMedium{.speed_exponent = 0, .saturation_n = 0.5, .wear_half_n_s = 0.3};
+  constexpr BurLaw kBent{.force_exponent = 1.5, .speed_exponent = 0.29, .wear_half_n_s = 0.5};
+  for (const BurLaw& law : {kMedium, kBent}) {
+    for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+      for (const int rate_hz : {1000, 4000}) {
+        CAPTURE(law.force_exponent);
+        CAPTURE(static_cast<int>(numeric));
+        CAPTURE(rate_hz);
+        LoadedScene scene = mill_scene();
+        scene.servo.numeric = numeric;
+        scene.servo.rate_hz = rate_hz;
+        scene.cut.machinability_mm3_per_s_n = 8;
+        scene.tools[0].law = law;
+        CuttingHand miller(scene);
+        ServoOutput out;
+        for (int i = 0; i < rate_hz; ++i) {
+          const double ms = 1000.0 * i / rate_hz;
+          out = miller.step({0.3 * std::sin(0.01 * ms), 0.8 - 0.0025 * ms, 0});
+        }
+        CHECK(out.sharpness < 0.7);
+        CHECK(miller.removed_mm3() > 1);
+        CHECK(std::abs(miller.removed_mm3() / miller.fed_mm3() - 1) < 3e-5);
+      }
+    }
+  }
+}
+
 // F12
 TEST_CASE("a spindle that stands removes nothing and rubs nothing") {
   LoadedScene scene = mill_scene();

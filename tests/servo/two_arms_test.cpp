@@ -178,6 +178,45 @@ TEST_CASE("a snapshot of two arms continues to the bit, and does not fit one") {
   CHECK_THROWS_AS(single.servo->restore(*kept), std::invalid_argument);
 }
 
+TEST_CASE("each bur of each arm wears alone; a reset renews all, and snapshots keep them") {
+  LoadedScene scene = two_armed(kCutKinds[0]);
+  scene.tools[0].law.wear_half_n_s = 0.002;
+  scene.tools[1].law.wear_half_n_s = 0.02;
+  Bench bench(scene), other(alone(scene, 1));
+  for (Bench* each : {&bench, &other}) each->dock();
+  for (int tick = 0; tick < 170; ++tick) {  // the second is still above, the first again
+    bench.step(tick < 150 ? stroke(tick) : Hand{}, stroke(tick - 100));
+    other.step(stroke(tick - 100));
+  }
+  const double first = bench.out[0].sharpness;
+  CHECK(first < 0.8);
+  CHECK(bench.out[1].sharpness == 1);
+  const auto kept = bench.servo->keep();
+  for (int tick = 170; tick < 600; ++tick) {
+    bench.step({}, stroke(tick - 100));
+    other.step(stroke(tick - 100));
+    REQUIRE(bench.out[1].output_hash == other.out[0].output_hash);
+  }
+  CHECK(bench.out[0].sharpness == first);
+  CHECK(bench.out[1].sharpness < 0.8);
+  CHECK(bench.out[1].sharpness == other.out[0].sharpness);
+  // A bur that is put down keeps its wear; the second arm's are not the first one's.
+  bench.servo->apply({ServoCommand::Kind::select_tool, 1, 0});
+  bench.step({}, {});
+  CHECK(bench.out[0].sharpness == 1);
+  bench.servo->apply({ServoCommand::Kind::select_tool, 0, 0});
+  bench.step({}, {});
+  CHECK(bench.out[0].sharpness == first);
+  bench.servo->apply({ServoCommand::Kind::reset, 0});
+  for (int tick = 0; tick < 600; ++tick) bench.step({}, {});
+  CHECK(bench.out[0].sharpness == 1);
+  CHECK(bench.out[1].sharpness == 1);
+  bench.servo->restore(*kept);
+  bench.step({}, {});
+  CHECK(bench.out[0].sharpness == first);
+  CHECK(bench.out[1].sharpness == 1);
+}
+
 TEST_CASE("a tick of two arms allocates nothing") {
   Bench bench(two_armed(kCutKinds[0]));
   bench.dock();

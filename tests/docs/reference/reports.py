@@ -35,6 +35,7 @@ REPORTS = [
         ("removed_mm3_by_material", "mm3", "the same, by the scene's materials"),
         ("removed_density_mm3", "mm3", "density taken away over full density, since the last reset, by all arms"),
         ("forbidden_ms", "ms", "how long each forbidden material was touched"),
+        ("sharpness", "", "rate of the bur in the hand at the end over that of a new one (docs/cutting.md)"),
         ("resets, undos, redos", "", "of the volumes; of one stroke each"),
         ("energy_j", "J", "work at the device port: positive is taken from the hand"),
         ("port_minimum_j", "J", "its lowest value: below 0 the loop gave more than it took"),
