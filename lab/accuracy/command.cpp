@@ -1,44 +1,91 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdio>
+#include <array>
 #include <memory>
 #include <ostream>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "controller/load/load_scene.hpp"
+#include "controller/plan/plan_contact.hpp"
+#include "hil/hil_error.hpp"
+#include "lab/accuracy/proxy_study.hpp"
 #include "lab/accuracy/study.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/report_tool.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::accuracy {
 namespace {
 
-constexpr const char* kHead =
-    "knob          value              us p50    p99  force rms %  direction deg  tool loop\n";
+/// A column of the table on the terminal: its title, the metric, and a factor to the title's unit.
+struct ShownMetric {
+  const char* title;
+  const char* metric;
+  double factor;
+};
+constexpr std::array<ShownMetric, 3> kOfPaper{{{"force rms %", "force_vs_theory_rms", 100},
+                                               {"direction deg", "force_direction_rms", 1},
+                                               {"tool loop %", "loop_tool_rms", 100}}};
+constexpr std::array<ShownMetric, 4> kOfProxy{{{"depth max vox", "depth_max", 1},
+                                               {"force max %", "force_vs_theory_max", 100},
+                                               {"direction max", "force_direction_max", 1},
+                                               {"step max %", "step_max", 100}}};
 
-std::string line_of(const Entry& entry) {
-  char text[160];
-  std::snprintf(text, sizeof text, "%-13s %-16s %8.2f %6.2f %12.2f %14.3f %10.1e",
-                entry.knob.c_str(), entry.value.c_str(), entry.times.p50_ns / 1e3,
-                entry.times.p99_ns / 1e3, *entry.find("force_vs_theory_rms") * 100,
-                *entry.find("force_direction_rms"), *entry.find("loop_tool_rms"));
-  return text;
+void print(std::ostream& out, const std::vector<Entry>& entries,
+           std::span<const ShownMetric> metrics) {
+  out << format("%-13s %-17s %8s %7s", "knob", "value", "us p50", "p99");
+  for (const ShownMetric& shown : metrics) out << format(" %14s", shown.title);
+  out << '\n';
+  for (const Entry& entry : entries) {
+    out << format("%-13s %-17s", entry.knob.c_str(), entry.value.c_str());
+    if (entry.figures.empty()) {
+      out << '\n';
+      continue;
+    }
+    out << format(" %8.2f %7.2f", entry.times.p50_ns / 1e3, entry.times.p99_ns / 1e3);
+    for (const ShownMetric& shown : metrics) {
+      const double* figure = entry.find(shown.metric);
+      out << (figure == nullptr ? format(" %14s", "-") : format(" %14.3g", *figure * shown.factor));
+    }
+    out << '\n';
+  }
 }
 
-/// `kerf-lab accuracy`: each knob of the contact force against analytic shapes.
+/// What a scene of the default contact has: its active tool and its finest voxel.
+ProxySubject subject_of(const std::string& path) {
+  const LoadedScene scene = load_scene(path);
+  if (scene.force.model != ForceModel::proxy) {
+    throw HilError("--scene: " + path + " has force.model = \"" +
+                   std::string(scene.force.model == ForceModel::paper ? "paper" : "external") +
+                   "\"; the errors of the paper's force are those without --scene");
+  }
+  if (scene.volumes.empty() || scene.tools.empty()) {
+    throw HilError("--scene: " + path + " has no volume or no tool; its contact has no error");
+  }
+  return {scene.tools[scene.active_tool], contact_unit_mm(scene)};
+}
+
+/// `kerf-lab accuracy`: each knob of the contact against analytic shapes.
 class AccuracyCommand final : public LabCommand {
  public:
   explicit AccuracyCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
-  std::string report_, csv_, plot_, page_;
+  std::string scene_, report_, csv_, plot_, page_;
   int core_ = -1;
 };
 
 AccuracyCommand::AccuracyCommand(Arguments& program)
-    : LabCommand(program, "accuracy", "each knob of the contact force against analytic shapes") {
+    : LabCommand(program, "accuracy", "each knob of the contact against analytic shapes") {
+  app_.option(
+          "--scene", scene_,
+          "measure this scene's tool in its voxels, twice and half of them: the default contact "
+          "alone")
+      .shown_as("FILE");
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
   app_.option("--csv", csv_, "write the figures as a table").shown_as("FILE");
   app_.option("--plot", plot_, "draw error against time as SVG").shown_as("FILE");
@@ -56,15 +103,22 @@ int AccuracyCommand::run(std::ostream& out) const {
   const std::string plot = plot_.empty() ? page_plot("--page", page_, ".svg") : plot_;
   const LabOutput as_plot("--plot", plot, ".svg");
   LabOutput::check_distinct({&as_json, &as_csv, &as_page, &as_plot});
+  if (!scene_.empty() && !(page_.empty() && plot.empty())) {
+    throw HilError("--scene: page and plot are those of the standard; use --csv or --report");
+  }
+  const ProxySubject subject = scene_.empty() ? ProxySubject::standard() : subject_of(scene_);
   if (!plot.empty()) check_can_plot();
   const int core = pin_lab(core_);
-  std::vector<Entry> entries;
+  std::vector<Entry> entries, of_proxy;
   {
     const ProgressBar bar(true);
-    entries = study({}, [&](double share, const std::string& what) { bar.show(share, what); });
+    const auto show = [&](double share, const std::string& what) { bar.show(share, what); };
+    of_proxy = proxy_study({}, subject, show);
+    if (scene_.empty()) entries = study({}, show);
   }
-  out << kHead;
-  for (const Entry& entry : entries) out << line_of(entry) << '\n';
+  print(out, of_proxy, kOfProxy);
+  if (!entries.empty()) print(out << '\n', entries, kOfPaper);
+  entries.insert(entries.begin(), of_proxy.begin(), of_proxy.end());
   const std::string report = json(entries, core);
   as_json.write(report);
   as_csv.write(csv(entries));

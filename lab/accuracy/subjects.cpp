@@ -92,7 +92,7 @@ Point AnalyticVolume::mm_from_voxel(VoxelVec<double> at) const noexcept {
   return {along(at.x, grid.nx), along(at.y, grid.ny), along(at.z, grid.nz)};
 }
 
-AnalyticVolume volume_of(const Shape& shape, double side_mm, double voxel_mm) {
+AnalyticVolume volume_of(const Shape& shape, double side_mm, double voxel_mm, double ramp_vox) {
   const auto n = static_cast<std::int32_t>(std::lround(side_mm / voxel_mm));
   AnalyticVolume volume{{n, n, n}, voxel_mm, {}};
   volume.density.reserve(volume.grid.voxel_count());
@@ -100,8 +100,8 @@ AnalyticVolume volume_of(const Shape& shape, double side_mm, double voxel_mm) {
     for (std::int32_t y = 0; y < n; ++y) {
       for (std::int32_t x = 0; x < n; ++x) {
         const Point at = volume.mm_from_voxel({double(x), double(y), double(z)});
-        volume.density.push_back(
-            static_cast<Density>(std::lround(kDensityMax * shape.density(at, voxel_mm))));
+        volume.density.push_back(static_cast<Density>(
+            std::lround(kDensityMax * shape.density(at, ramp_vox * voxel_mm))));
       }
     }
   }
@@ -175,18 +175,22 @@ Subjects::Subjects(std::size_t contacts, std::size_t walks) : walks_(walks) {
   }
 }
 
-std::vector<TestShape> Subjects::in_voxels(double voxel_mm, double side_mm) const {
+TestShape Subjects::planes_in_voxels(double voxel_mm, double side_mm, double ramp_vox) const {
   TestShape plane{"plane", {}};
   for (const Touched& tilted : planes_) {
     const std::size_t walks = plane.cases.size() < walks_ ? 1 : 0;
-    plane.cases.push_back(
-        {tilted.shape, volume_of(tilted.shape, kTiltSideMm, voxel_mm), tilted.contacts, walks});
+    plane.cases.push_back({tilted.shape, volume_of(tilted.shape, side_mm, voxel_mm, ramp_vox),
+                           tilted.contacts, walks});
   }
-  std::vector<TestShape> subjects{std::move(plane)};
+  return plane;
+}
+
+std::vector<TestShape> Subjects::in_voxels(double voxel_mm, double side_mm, double ramp_vox) const {
+  std::vector<TestShape> subjects{planes_in_voxels(voxel_mm, kTiltSideMm, ramp_vox)};
   for (const Touched& solid : solids_) {
     subjects.push_back({solid.shape.name,
-                        {{solid.shape, volume_of(solid.shape, side_mm, voxel_mm), solid.contacts,
-                          std::min(walks_, solid.contacts.size())}}});
+                        {{solid.shape, volume_of(solid.shape, side_mm, voxel_mm, ramp_vox),
+                          solid.contacts, std::min(walks_, solid.contacts.size())}}});
   }
   return subjects;
 }

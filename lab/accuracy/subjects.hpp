@@ -47,8 +47,8 @@ struct Shape {
 /// Enamel of full density around a dentin of 0.6.
 [[nodiscard]] Shape layered_ball(Point centre, double radius_mm, double enamel_mm);
 
-/// A shape in voxels, antialiased over one voxel edge. The point (0, 0, 0) mm is the centre of the
-/// voxel with index n / 2 along each axis.
+/// A shape in voxels, antialiased over some voxel edges. The point (0, 0, 0) mm is the centre of
+/// the voxel with index n / 2 along each axis.
 struct AnalyticVolume {
   VoxelGrid grid;
   double voxel_mm;
@@ -58,8 +58,9 @@ struct AnalyticVolume {
   [[nodiscard]] Point mm_from_voxel(VoxelVec<double> at) const noexcept;
 };
 
-/// A cube of `side_mm` around (0, 0, 0).
-[[nodiscard]] AnalyticVolume volume_of(const Shape& shape, double side_mm, double voxel_mm);
+/// A cube of `side_mm` around (0, 0, 0); faces are ramps over `ramp_vox`.
+[[nodiscard]] AnalyticVolume volume_of(const Shape& shape, double side_mm, double voxel_mm,
+                                       double ramp_vox = 1);
 
 /// The `i`-th of `count` directions that cover the sphere evenly (Fibonacci lattice).
 [[nodiscard]] Point spread_direction(std::size_t i, std::size_t count);
@@ -113,8 +114,12 @@ class Subjects {
   /// `contacts` of each shape, and tilts of the plane; `walks` from the first of them.
   Subjects(std::size_t contacts, std::size_t walks);
 
-  /// In cubes of `side_mm`; the planes have smaller ones.
-  [[nodiscard]] std::vector<TestShape> in_voxels(double voxel_mm, double side_mm) const;
+  /// In cubes of `side_mm`; the planes have smaller ones. Faces are ramps over `ramp_vox`.
+  [[nodiscard]] std::vector<TestShape> in_voxels(double voxel_mm, double side_mm,
+                                                 double ramp_vox = 1) const;
+  /// The planes alone.
+  [[nodiscard]] TestShape planes_in_voxels(double voxel_mm, double side_mm,
+                                           double ramp_vox = 1) const;
 
  private:
   struct Touched {

@@ -14,12 +14,44 @@ ABOUT = """\
 
 Made by `./kerf lab accuracy --page docs/accuracy.md`; every figure comes from one run, nothing is typed
 by hand. On one machine a run repeats bit for bit, but for the times. `--csv` writes all figures, each metric on each
-shape; `--report` writes the same as JSON.
+shape; `--report` writes the same as JSON. `./kerf lab accuracy --scene mine.toml` measures the default contact with the
+tool and the voxels of a scene.
 
-One setting of the paper's contact force (docs/theory.md 7.1) is changed at a time. The others stay at the standard,
-in bold: Q15 weights, tool pitch = voxel, `farid` gradients stored as int16, trilinear, voxels of 0.125 mm in 128^3. A
-ball of 0.625 mm radius touches six shapes, at 100 positions each and at depths up to its radius: a plane at 100 tilts, a
-ball, a torus, a plate as thin as two voxels, a groove of 90 degrees, a ball of enamel around dentin.
+A ball of 0.625 mm radius touches six shapes, at 100 positions each and at depths up to its radius: a plane at 100 tilts, a
+ball, a torus, a plate as thin as two voxels of 0.125 mm, a groove of 90 degrees, a ball of enamel around dentin. One setting
+is changed at a time; the others stay at the standard, in bold.
+
+"""
+
+PROXY = """\
+## The swept proxy
+
+The default contact (docs/theory.md 4), as the servo runs it. A hand goes straight down from a contact; the tool should stay
+where it was, so that the spring from hand to tool is the way back. Faces are ramps over two voxels, as a scanner has them.
+
+* `depth`: of the tool's centre along the normal, from where it should rest, in voxels.
+* `force`: length of the spring over that of the way; `direction`: its angle to the normal. Both where the way is at least a
+  tenth of the radius.
+* `step`: the change of the force over 0.00125 mm (a hundredth of the standard's voxel) along the face, over the force.
+* `us p50`, `p99`: times of one tick that slides on the ball, without milling.
+
+"""
+
+NOTICED = """\
+What a hand can notice: a force of one direction from one of another at 18.4 degrees if the picture shows the same, at 25.6
+without a picture (Barbagli, Salisbury, Ho, Spence, Tan 2006, the abstract's means of the three conditions); a force that
+is 7 % larger, from 2.5 to 10 N (Pang, Tan, Durlach 1991, the abstract). So of the standard the direction is {direction} times finer
+than a hand, the force at its worst {force} times. Voxels half as wide make a tick {fine_time} times as long and bring
+{fine_direction} instead of {standard_direction} degrees: both are far below what is felt. They are worth it for a shape that is
+thinner than two voxels, not for the hand.
+
+"""
+
+PAPER = """\
+## The paper's force
+
+One setting of the paper's contact force (docs/theory.md 7.1) is changed at a time. The standard is Q15 weights, tool
+pitch = voxel, `farid` gradients stored as int16, trilinear, voxels of 0.125 mm in 128^3.
 
 Truth is the shape itself with sharp faces: F = -p0 SURFINT rho n dA over the tool's surface, exact to 1e-4.
 Forces are fractions of full scale, p0 pi R^2. `rms` and `max` are over all shapes unless stated.
@@ -45,10 +77,16 @@ half a voxel larger than the tool's, at steps of a quarter to a whole voxel: the
 
 PERCENT, PERMILLE, PPM = 100, 1000, 1e6
 
+# What a hand tells apart, with a picture (Barbagli et al. 2006, Pang et al. 1991: see NOTICED).
+HAND_DIRECTION_DEG, HAND_FORCE = 18.4, 0.07
+
 # Column of a table: title, metric, factor to the title's unit, shape.
 THEORY = ("force rms %", "force_vs_theory_rms", PERCENT, "all")
 THEORY_MAX = ("max %", "force_vs_theory_max", PERCENT, "all")
 DIRECTION = ("direction rms deg", "force_direction_rms", 1, "all")
+DEPTH = ("depth rms vox", "depth_rms", 1, "all")
+DEPTH_MAX = ("max vox", "depth_max", 1, "all")
+STEP_PERCENT = ("step max %", "step_max", PERCENT, "all")
 DIRECTION_MAX = ("max deg", "force_direction_max", 1, "all")
 DOUBLE = ("against double rms ppm", "force_vs_double_rms", PPM, "all")
 DOUBLE_MAX = ("max ppm", "force_vs_double_max", PPM, "all")
@@ -63,6 +101,15 @@ NOISE = ("noise", "noise_gain", 1, "noise")
 MEMORY = ("bytes a voxel", "memory", 1, "any")
 SAMPLES = ("samples", "samples", 1, "any")
 ORDER = ("order", "order", 1, "all")
+
+PROXY_COLUMNS = [SAMPLES, DEPTH, DEPTH_MAX, THEORY, THEORY_MAX, DIRECTION, DIRECTION_MAX, STEP_PERCENT]
+# Knob and what it is.
+PROXY_KNOBS = [
+    ("proxy voxel", "Edge of a voxel. The shapes keep their millimetres."),
+    ("proxy spacing", "Distance of the samples on the tool's surface, over the servo's own."),
+    ("proxy numbers", "Of the loop."),
+    ("proxy kernels", "Of this machine. They give the same bits; a scene's rate is planned for each (docs/scenes.md)."),
+]
 
 # Knob, its text, its columns.
 TABLES = [
@@ -182,19 +229,42 @@ def advice(entries):
     return re.sub(r"\{([^{}|]+)\|([^{}|]+)\}", filled, ADVICE)
 
 
+def knob_table(entries, knob, columns):
+    return text.table([knob.removeprefix("proxy "), ">us p50", ">p99", *(">" + title for title, *_ in columns)],
+                      [[entry.name, entry.time(entry.us), entry.time(entry.us_p99), *map(entry.cell, columns)]
+                       for entry in entries if entry.knob == knob])
+
+
+def shape_table(standard, columns):
+    return text.table(["shape", *(">" + title for title, *_ in columns)],
+                      [[shape, *(standard.cell((*column[:3], shape)) for column in columns)] for shape in SHAPES])
+
+
+def of_proxy(entries):
+    """The section of the default contact."""
+    standard = next(entry for entry in entries if entry.standard)
+    fine = [entry for entry in entries if entry.knob == "proxy voxel"][-1]
+    direction, force = standard.find("force_direction_max"), standard.find("force_vs_theory_max")
+    parts = [PROXY, NOTICED.format(
+        direction=text.figure(HAND_DIRECTION_DEG / direction), force=text.figure(HAND_FORCE / force),
+        fine_time=text.figure(fine.us / standard.us), fine_direction=text.figure(fine.find("force_direction_max")),
+        standard_direction=text.figure(direction))]
+    for knob, about in PROXY_KNOBS:
+        parts.append(about + "\n\n" + knob_table(entries, knob, PROXY_COLUMNS) + "\n")
+    return "".join(parts) + "The standard on each shape.\n\n" + shape_table(standard, PROXY_COLUMNS[1:]) + "\n"
+
+
 def page(data, plot):
-    entries = entries_of(data)
-    parts = [ABOUT, data["provenance"], f"\n\n![Error against the time of a tick]({plot})\n\n", advice(entries)]
+    all_entries = entries_of(data)
+    proxy = [entry for entry in all_entries if entry.knob.startswith("proxy")]
+    entries = [entry for entry in all_entries if entry not in proxy]
+    parts = [ABOUT, data["provenance"], "\n\n", of_proxy(proxy), PAPER,
+             f"![Error against the time of a tick]({plot})\n\n", advice(entries)]
     for knob, about, columns in TABLES:
-        parts.append(about + "\n\n" + text.table(
-            [knob, ">us p50", ">p99", *(">" + title for title, *_ in columns)],
-            [[entry.name, entry.time(entry.us), entry.time(entry.us_p99), *map(entry.cell, columns)]
-             for entry in entries if entry.knob == knob]) + "\n")
+        parts.append(about + "\n\n" + knob_table(entries, knob, columns) + "\n")
     standard = next(entry for entry in entries if entry.standard)
     columns = [THEORY, THEORY_MAX, DIRECTION, DIRECTION_MAX, SAMPLE_LOOP, TOOL_LOOP, STEP]
-    parts.append("## The shapes\n\nThe standard on each shape.\n\n" + text.table(
-        ["shape", *(">" + title for title, *_ in columns)],
-        [[shape, *(standard.cell((*column[:3], shape)) for column in columns)] for shape in SHAPES]) + "\n")
+    parts.append("## The shapes\n\nThe standard on each shape.\n\n" + shape_table(standard, columns) + "\n")
     return "".join(parts) + REMOVAL
 
 
@@ -213,7 +283,7 @@ def plot(data):
     from matplotlib.lines import Line2D
     colours = {"standard": fig.BLACK, "arithmetic": fig.ORANGE, "pitch": fig.SKY, "kernel": fig.GREEN, "storage": fig.RED,
                "interpolation": fig.PINK, "voxel": fig.BLUE}
-    entries = entries_of(data)
+    entries = [entry for entry in entries_of(data) if not entry.knob.startswith("proxy")]
     picture, axes = fig.new_figure(2 * (WIDTH + 95) + 20, 2 * (HEIGHT + 95) + 55, rows=2, columns=2, left=75, right=40, top=85,
                                    bottom=60, across=95, down=95)
     for panel, one in zip(PANELS, (axes[0][0], axes[0][1], axes[1][0], axes[1][1])):

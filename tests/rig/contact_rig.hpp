@@ -16,74 +16,19 @@
 #include "controller/plan/tables/point_shell_table.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "tests/rig/geometry.hpp"
 
 /// Tools among bodies under the servo's own swept contact, for studies and tests: a head, a head
 /// with its shaft, a tool guided open loop, and a tool at rest.
 namespace kerf::extremes {
 
-inline constexpr Density kIso = 32768;
+inline constexpr Density kIso = kHalfDensity;
 
 /// A tool of voxels of 1 mm, so that mm are units.
 [[nodiscard]] inline SceneTool tool_of_units(const char* shape, double radius, double length) {
   return make_tool(shape, shape, {.pitch_mm = 1, .radius_mm = radius, .length_mm = length});
 }
-
-/// The samples of a tool in units: of a mesh they take some 0.4 seconds.
-struct SampledTool {
-  std::vector<Point> samples;
-  std::vector<SurfaceSample> close;
-  double deficit = 0;
-  bool round = false;
-
-  SampledTool(const SceneTool& tool)  // NOLINT(google-explicit-constructor): a tool is one
-      : samples(surface_samples(tool, 1.0)),
-        close(close_samples(tool, 1.0)),
-        deficit(support_deficit_mm(tool.mesh, close)),
-        round(tool.round) {}
-};
-
-/// A volume whose voxels are units, at the origin of contact space.
-template <class N>
-[[nodiscard]] ContactFrame<N> plain_frame() {
-  ContactFrame<N> frame;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    frame.voxel_from_contact.row[axis][axis] = typename N::Ratio(1);
-  }
-  return frame;
-}
-
-/// One tool among bodies under the servo's own collision query, by default on the fastest kernels
-/// of this machine. The caller keeps the bodies.
-template <class N>
-class ContactRig {
- public:
-  explicit ContactRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets());
-  ContactRig(const SampledTool& tool, const Body& body, Density iso = kIso);
-  ContactRig(const ContactRig&) = delete;
-  ContactRig& operator=(const ContactRig&) = delete;
-
-  void add(const Body& body, const ContactFrame<N>& frame, Density iso = kIso);
-  /// One tick of the swept contact, as in the servo.
-  ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, const ProxyPose<N>& goal);
-
-  /// The query of a sweep.
-  [[nodiscard]] ContactQuery<N>& field() { return *query_; }
-  /// Half the sine of a turn that a sweep may make at once: see `rotation_step_of`.
-  [[nodiscard]] typename N::Unit rotation_step() const {
-    const double reach = std::max(1.0, static_cast<double>(points_.reach));
-    return typename N::Unit(points_.table.round ? 0 : rotation_step_of(reach));
-  }
-
- private:
-  const KernelSet& kernels_;
-  PointShellTable<N> tool_;
-  PointShell<N> points_;
-  std::deque<MappedField> fields_;
-  std::deque<TransformedShell<N>> memories_;
-  std::vector<ContactVolume<N>> volumes_;
-  std::optional<ContactQuery<N>> query_;
-};
 
 /// A tool in a body, guided open loop: the hand ignores the force.
 template <class N>
