@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/stability/identified_loop.hpp"
 
+#include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <optional>
 
 namespace kerf {
@@ -19,15 +21,25 @@ SampledLoop loop_along(const IdentifiedDevice& device, const DeviceDirection& di
   return loop;
 }
 
+double pushed_stiffness(const SampledLoop& loop, double damping_ns_per_mm, double peak_n) {
+  constexpr double kMmPerM = 1000;
+  const double late_s = loop.period_s / 2 + loop.delay_s;
+  const double swing =
+      8 / std::numbers::pi * (loop.coulomb_n / peak_n) * std::sqrt(loop.mass_kg / kMmPerM) / late_s;
+  const double root =
+      (swing + std::sqrt(swing * swing + 4 * highest_stiffness(loop, damping_ns_per_mm))) / 2;
+  return root * root;
+}
+
 DeviceDirection worst_direction(const IdentifiedDevice& device, double damping_ns_per_mm,
-                                double rate_hz) {
+                                double rate_hz, double peak_n) {
   // Half of the neighbours of a cube's middle: the others are the same lines.
   std::optional<DeviceDirection> worst;
   double lowest = 0;
   const auto try_along = [&](const IdentifiedDevice::Axes& direction) {
     const DeviceDirection now = along(device, direction);
     const double boundary =
-        highest_stiffness(loop_along(device, now, rate_hz, false), damping_ns_per_mm);
+        pushed_stiffness(loop_along(device, now, rate_hz, false), damping_ns_per_mm, peak_n);
     if (worst && !(boundary < lowest)) return false;
     worst = now;
     lowest = boundary;

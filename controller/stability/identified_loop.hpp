@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
+
 #include "include/kerf/stability.hpp"
 #include "shared/device/identified_device.hpp"
 
@@ -15,9 +17,16 @@ namespace kerf {
                                      const DeviceDirection& direction, double rate_hz,
                                      bool at_worst);
 
-/// The direction with the lowest exact linear boundary at this damping and rate, within 0.1
-/// degrees: searched from the lowest of the 13 axes and diagonals of a cube. Load time.
-[[nodiscard]] DeviceDirection worst_direction(const IdentifiedDevice& device,
-                                              double damping_ns_per_mm, double rate_hz);
+/// About the lowest stiffness, N/mm, that any push makes oscillate on a device with friction whose
+/// motors give `peak_n` (docs/theory.md 5.7, with the exact boundary in place of b/(T/2 + td)).
+/// With an infinite peak, or without friction, the exact linear boundary.
+[[nodiscard]] double pushed_stiffness(const SampledLoop& loop, double damping_ns_per_mm,
+                                      double peak_n);
+
+/// The direction with the lowest `pushed_stiffness` at this damping and rate, within 0.1 degrees:
+/// searched from the lowest of the 13 axes and diagonals of a cube. Load time.
+[[nodiscard]] DeviceDirection worst_direction(
+    const IdentifiedDevice& device, double damping_ns_per_mm, double rate_hz,
+    double peak_n = std::numeric_limits<double>::infinity());
 
 }  // namespace kerf

@@ -214,7 +214,7 @@ struct MapOptions {
   /// Ends the map when another thread sets it: columns that are not done then have no cells.
   const std::atomic<bool>* stop = nullptr;
   /// Of a device that is a file: "x", "y", "z", such as "1,0,1", or "worst", as if empty, the one
-  /// with the lowest linear boundary.
+  /// with the lowest stiffness that any push makes oscillate, by docs/theory.md 5.7.
   std::string direction{};
 };
 

@@ -83,15 +83,15 @@ std::string text_of(const Spectrum& spectrum) {
       format("K %g N/mm, B %g N s/mm at %g Hz, delay %g ms; %s\n", spectrum.stiffness_n_per_mm,
              subject.damping_ns_per_mm, 1 / subject.loop.period_s, 1000 * subject.loop.delay_s,
              zwidth::laws_of(spectrum.values).c_str());
-  text += format("%8s %20s %20s %17s %21s\n", "", "wall, theory", "wall, measured", "off",
+  text += format("%-8s %20s %20s %17s %21s\n", "motion", "wall, theory", "wall, measured", "off",
                  "device and wall");
-  text += format("%8s %10s%10s %10s%10s %9s%8s %11s%10s\n", "Hz", "K N/mm", "B N s/mm", "K N/mm",
+  text += format("%-8s %10s%10s %10s%10s %9s%8s %11s%10s\n", "Hz", "K N/mm", "B N s/mm", "K N/mm",
                  "B N s/mm", "%", "deg", "K N/mm", "B N s/mm");
   Deviation most;
   for (const SineResult& row : spectrum.rows) {
     const Impedance theory = spectrum.wall_by_theory(row);
     const Impedance port = spectrum.port_measured(row).value_or(spectrum.port_by_theory(row));
-    text += format("%8.4g %10.4g%10.3g ", row.hz, felt_stiffness(theory, row.hz), theory.real());
+    text += format("%-8.4g %10.4g%10.3g ", row.hz, felt_stiffness(theory, row.hz), theory.real());
     if (row.wall) {
       const Deviation off = deviation(*row.wall, theory);
       most.ratio = std::max(most.ratio, std::abs(off.ratio));

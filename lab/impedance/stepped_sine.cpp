@@ -9,6 +9,7 @@
 #include "controller/stability/sampled_loop.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/stability/one_axis_wall.hpp"
+#include "shared/numeric/quick_elementary.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf::impedance {
@@ -32,7 +33,7 @@ Impedance held_force(const zwidth::LoopCase& subject, double stiffness, const St
     return kTurn * static_cast<double>(part) / static_cast<double>(sine.ticks);
   };
   const auto reading_mm = [&](std::int64_t tick) {
-    const double tip_mm = stroke.amplitude_mm * std::cos(phase(tick)) - stroke.middle_mm;
+    const double tip_mm = stroke.amplitude_mm * quick::cosine(phase(tick)) - stroke.middle_mm;
     if (!(loop.quantum_mm > 0)) return tip_mm;
     return std::floor(tip_mm / loop.quantum_mm) * loop.quantum_mm;
   };

@@ -10,7 +10,9 @@ measure reads {program, quick, jobs, provenance}: the path of kerf-lab, whether 
                                 at last the highest K that `kerf-controller --check` accepts without a warning, 0: none
     stabilisers                 rows {device, delay, lowest: {STABILISER: [one axis, whole arm]}}
     knobs                       rows {name, unit, value, standard, swings, active, exact, re_entry}
-    numbers                     rows {numeric, cells, others, columns, factor}"""
+    numbers                     rows {numeric, cells, others, columns, factor}
+    question                    {zwidth, impedance: lines of the two commands with what they print; stiffness, felt: its K as a text,
+                                rows of `kerf lab impedance --json` (impedance.py)}"""
 import json
 import math
 import os
@@ -20,6 +22,8 @@ import tempfile
 
 import text
 from stability_map import AXES, NEVER, crossing, lowest
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 
 ABOUT = """\
 # Stability
@@ -163,6 +167,31 @@ no rows.
 
 """
 
+QUESTION = """\
+## Which stiffness, and how it feels
+
+Which K may an arm render, for any push, in its worst direction, and what does a hand feel at 30 Hz? A map takes the
+device from a file; [`./kerf identify`](identify.md) writes that of yours. `examples/devices/premium15.toml` has a Phantom
+Premium 1.5 by published figures: a mass matrix, 2.6 times as heavy in one direction as in another. `worst` is the
+direction with the lowest stiffness that any push makes oscillate, by theory (docs/theory.md 5.7); `--direction 1,0,0.5`
+sets another one.
+
+"""
+
+ANSWER = """
+So it may render {k} N/mm at B = {b} N s/mm, the lowest K over 1.5 as in the table above. That wall over frequency:
+
+"""
+
+FELT = """
+At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is stiffer and less damped than the wall of the theory
+(docs/theory.md 5.8), because `foaw` lags behind the difference that the theory has. At the device's port it feels
+{port_k} N/mm and {port_b} N s/mm, since the mass counts against the spring. Where the damping is negative, the hand gets energy,
+unless it damps more than that itself. `--arm` measures the whole servo step with an emulated device, `--plot` draws the
+figures, `--estimator difference` has the theory's wall.
+
+"""
+
 HOW = """\
 ## Maps of your own
 
@@ -245,7 +274,8 @@ def measure(order):
                          ["--seeds", "1"])
     return json.dumps({"provenance": order["provenance"], "highest_n_per_mm": 2 if quick else 50, "devices": devices, "rates": rates,
                        "table": measure_devices(maps, devices), "stabilisers": measure_stabilisers(maps),
-                       "knobs": measure_knobs(maps, devices), "numbers": measure_numbers(maps)})
+                       "knobs": measure_knobs(maps, devices), "numbers": measure_numbers(maps),
+                       "question": measure_question(order["program"])})
 
 
 def measure_devices(maps, devices):
@@ -338,6 +368,38 @@ def measure_numbers(maps):
     return rows
 
 
+def measure_question(program):
+    """The two commands, as the page prints them, and what they find."""
+    def run(words):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([program, *words, "--json", f"{folder}/a.json"], stdout=subprocess.PIPE, text=True, check=False,
+                                  cwd=ROOT)
+            if done.returncode != 0:
+                raise text.BadInput(f"kerf-lab: {' '.join(words)}: failed (above)")
+            with open(f"{folder}/a.json", encoding="utf-8") as file:
+                data = json.load(file)
+        # The time of the run is that of this machine alone.
+        lines = [line.split(",")[0] + ", ..." if "servo steps in" in line else line for line in done.stdout.splitlines()]
+        return ["$ ./kerf lab " + " ".join(words), *lines], data
+    device = ["--device", "examples/devices/premium15.toml"]
+    bears, found = run(["zwidth", *device, "--damping", "0.002,0.006", "--stiffness", "0.1:10:16"])
+    k = below(min(lowest(found["columns"][0]), exact_of(found["columns"][0])) / MARGIN, 2)
+    feels, felt = run(["impedance", *device, "--stiffness", k, "--damping", "0.002", "--frequency", "1,10,30,100"])
+    return {"zwidth": bears, "impedance": feels, "stiffness": k, "damping": "0.002", "felt": felt["rows"]}
+
+
+def question(data):
+    row = min(text.rows_of(data, "felt"), key=lambda row: abs(row["hz"] - 30))
+
+    def shown(lines):
+        return "".join(f"    {line}\n" for line in lines)
+    figures = {f"{of}_{what[0]}": text.figure(row[of]["measured"][f"{what}_n{unit}_per_mm"])
+               for of in ("wall", "port") for what, unit in (("damping", "s"), ("stiffness", ""))}
+    return (QUESTION + shown(data["zwidth"]) + ANSWER.format(k=data["stiffness"], b=data["damping"]) + shown(data["impedance"])
+            + FELT.format(hz=text.figure(row["hz"]), wall_k=figures["wall_s"], wall_b=figures["wall_d"], port_k=figures["port_s"],
+                          port_b=figures["port_d"]))
+
+
 def first_below(highest):
     """The text of a first crossing; the ends are those of all maps of the page."""
     return lambda n_per_mm: f"> {highest}" if n_per_mm == NEVER else text.figure(n_per_mm) if n_per_mm > 0 else "< 0.05"
@@ -379,7 +441,7 @@ def page(data, devices, rates):
             + "".join(f"* {row['numeric']}: {row['others']} of {row['cells']} cells have another verdict than in double; the "
                       f"first crossing differs in {row['columns']} columns, at most by a\n  factor of {row['factor']:.3g}.\n"
                       for row in data["numbers"])
-            + NUMBERS + HOW + FILES + data["provenance"] + "\n")
+            + NUMBERS + question(data["question"]) + HOW + FILES + data["provenance"] + "\n")
 
 
 def devices(data):

@@ -53,7 +53,7 @@ DeviceDirection direction_of(const IdentifiedDevice& device, const std::string& 
     }
     return along(device, given);
   }
-  return worst_direction(device, damping_ns_per_mm, rate_hz);
+  return worst_direction(device, damping_ns_per_mm, rate_hz, LimitSettings().force_n);
 }
 
 DeviceDirection take_device(const std::string& file, const std::string& direction,

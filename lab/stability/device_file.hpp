@@ -10,7 +10,8 @@
 
 namespace kerf::zwidth {
 
-/// "x", "y", "z", "1,0,0", or "worst": `worst_direction` at this damping and rate. Throws HilError
+/// "x", "y", "z", "1,0,0", or "worst": `worst_direction` at this damping and rate, and
+/// the peak of a scene that sets none. Throws HilError
 /// for another text.
 [[nodiscard]] DeviceDirection direction_of(const IdentifiedDevice& device, const std::string& text,
                                            double damping_ns_per_mm, double rate_hz);

@@ -44,7 +44,7 @@ def zwidth(*, stiffness, seeds=5, seed=1, seconds=60, threads=0, direction="", *
     array, or "from:to:count". push (N), hit (mm/s) and start (mm) are searched unless they are given (docs/stability.md). The device is
     an emulated one, with a delay of one period unless `delay` says otherwise: map_loop has its figures. It may also be one of touch,
     omega and inverse3, alone, or one device.toml of kerf identify, across `direction`: "x", "y", "z", such as "1,0,1", or "worst", as
-    if it is empty: the one with the lowest linear boundary. seeds: so many of the encoders' steps against the wall, from
+    if it is empty: the one with the lowest stiffness that any push makes oscillate, by theory. seeds: so many of the encoders' steps against the wall, from
     `seed` on. seconds: to which a run that is still open is followed, at least. threads: 0
     for all cores; the map is the same. Returns a kerf.Map. Takes seconds to hours (docs/stability.md); Ctrl-C raises
     kerf.Interrupted with the Map of the columns that are done. Raises kerf.Error."""

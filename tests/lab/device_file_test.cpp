@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -62,21 +63,28 @@ TEST_CASE("an identified device has in each direction the mass that a wall there
         direction_of(device, "y", 0.002, 1000).mass_kg);
 }
 
-TEST_CASE("the worst direction has the lowest boundary of all that are tried") {
+TEST_CASE(
+    "the worst direction has the lowest stiffness that a push makes oscillate, with its friction") {
   const TemporaryFolder folder;
   const IdentifiedDevice device = read_identified_device(folder.write("device.toml", kDeviceFile));
-  const auto boundary = [&](const kerf::DeviceDirection& at) {
-    kerf::SampledLoop loop;
-    loop.mass_kg = at.mass_kg;
-    loop.viscous_ns_per_mm = at.viscous_ns_per_mm;
-    loop.delay_s = device.delay_s;
-    return kerf::highest_stiffness(loop, 0.002);
+  const auto lowest = [&](const kerf::DeviceDirection& at, double peak_n) {
+    return kerf::pushed_stiffness(kerf::loop_along(device, at, 1000, false), 0.002, peak_n);
   };
-  const double worst = boundary(direction_of(device, "worst", 0.002, 1000));
-  CHECK(worst > 0);
+  const auto worst = direction_of(device, "worst", 0.002, 1000);
+  CHECK(lowest(worst, 3.3) > 0);
   for (const char* other : {"x", "y", "z", "1,1,0", "1,0,-1", "1,-1,1"}) {
-    CHECK(worst <= boundary(direction_of(device, other, 0.002, 1000)));
+    CHECK(lowest(worst, 3.3) <= lowest(direction_of(device, other, 0.002, 1000), 3.3));
   }
+  // Near x, which has the least friction; without friction another one is lower.
+  CHECK(std::abs(worst.along[0]) > 0.98);
+  const auto light = kerf::worst_direction(device, 0.002, 1000);
+  CHECK(std::abs(light.along[0]) < 0.95);
+  const double never = std::numeric_limits<double>::infinity();
+  CHECK(lowest(light, never) < lowest(worst, never));
+  CHECK(
+      lowest(light, never) ==
+      doctest::Approx(kerf::highest_stiffness(kerf::loop_along(device, light, 1000, false), 0.002))
+          .epsilon(1e-12));
 }
 
 TEST_CASE(
@@ -88,7 +96,7 @@ TEST_CASE(
       "device.toml", device_file_with("0.032, 0.053, 0.077, 0.01, -0.022, 0.005",
                                       "0.0909, 0.0461, 0.0881, -0.0222, -0.0104, -0.0254")));
   const auto boundary = [&](const kerf::DeviceDirection& at) {
-    return kerf::highest_stiffness(kerf::loop_along(device, at, 1000, false), 0.003);
+    return kerf::pushed_stiffness(kerf::loop_along(device, at, 1000, false), 0.003, 3.3);
   };
   const auto worst = direction_of(device, "worst", 0.003, 1000);
   const double lowest = boundary(worst);
@@ -104,7 +112,8 @@ TEST_CASE(
 
 TEST_CASE("the worst direction is that at the damping of the map") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("device.toml", kDeviceFile);
+  const std::string file =
+      folder.write("device.toml", device_file_with("0.1, 0.2, 0.3", "0, 0, 0"));
   std::array<std::string, kerf::zwidth::kAxisCount> texts;
   texts[kerf::zwidth::index_of(kerf::zwidth::AxisId::damping)] = "0.02";
   const auto found = kerf::zwidth::take_device(file, "worst", texts);
