@@ -57,13 +57,12 @@ void print(std::ostream& out, const std::vector<Entry>& entries,
 /// What a scene of the default contact has: its active tool and its finest voxel.
 ProxySubject subject_of(const std::string& path) {
   const LoadedScene scene = load_scene(path);
-  if (scene.force.model != ForceModel::proxy) {
-    throw HilError("--scene: " + path + " has force.model = \"" +
-                   std::string(scene.force.model == ForceModel::paper ? "paper" : "external") +
-                   "\"; the errors of the paper's force are those without --scene");
+  if (scene.force.model == ForceModel::paper) {
+    throw HilError("--scene: " + path +
+                   " has the paper's force; its errors are those without --scene");
   }
-  if (scene.volumes.empty() || scene.tools.empty()) {
-    throw HilError("--scene: " + path + " has no volume or no tool; its contact has no error");
+  if (scene.force.model == ForceModel::external || scene.volumes.empty() || scene.tools.empty()) {
+    throw HilError("--scene: " + path + " has no contact of a tool with a volume; name another");
   }
   return {scene.tools[scene.active_tool], contact_unit_mm(scene)};
 }
