@@ -69,7 +69,8 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 ///   scene (K = s^2 2 pi R p0 = 0.377 N/mm with p0 = 0.06 N/mm^2). The proxy's stiffness is given
 ///   at the device port and stays;
 /// - a tool g times as large removes g^3 as much at the same force of the hand: machinability is
-///   multiplied by s g^3, the threshold by 1/s, the spindle's stall torque and inertia by g/s.
+///   multiplied by s g^3, the threshold and the forces of a bur's law by 1/s, the spindle's stall
+///   torque and inertia by g/s.
 ///
 /// `device.fit` fits a scene to its own first volume in the same way; its sizes were written for
 /// voxels of 0.125 mm. If no volume has labels, only the materials that the scene names stay.

@@ -88,7 +88,9 @@ class RunStatistics {
         record_.removed_steps[v] += output.removed_by_volume[v];
       }
       forbidden |= output.forbidden_materials;
+      if (record_.pulp) record_.pulp->add(output.spindle_load, output.spindle_ratio);
     }
+    if (record_.pulp) record_.pulp->advance();
     for (; forbidden != 0; forbidden &= forbidden - 1) {
       ++record_.forbidden_ticks[static_cast<std::size_t>(std::countr_zero(forbidden))];
     }
@@ -131,6 +133,7 @@ class RunStatistics {
     if (first.resetting) {
       record_.removed_steps = {};
       record_.forbidden_ticks = {};
+      if (record_.pulp) record_.pulp->restart();
     }
     if (follow(first.undoing, last_undo_, "undo", tick)) ++record_.undos;
     if (follow(first.redoing, last_redo_, "redo", tick)) ++record_.redos;

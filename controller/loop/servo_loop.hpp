@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <thread>
 
@@ -18,6 +19,7 @@
 #include "controller/servo/servo.hpp"
 #include "shared/external/external_page.hpp"
 #include "shared/numeric/statistics.hpp"
+#include "shared/segment/pulp_heat.hpp"
 #include "shared/segment/server.hpp"
 
 // The loop around the servo step, its record of a run, and the watchdog that switches the motors
@@ -74,9 +76,10 @@ struct RunRecord : ArmRecord {
   std::int64_t first_force_ns = 0;  ///< time of the first sent force, CLOCK_MONOTONIC; 0: none
   std::array<std::uint64_t, kMaxVolumes> removed_steps{};       ///< by volume, since the last reset
   std::array<std::uint64_t, kMostForbidden> forbidden_ticks{};  ///< by material, since then too
-  std::uint64_t resets = 0;  ///< of the volumes; before arming too
-  std::uint64_t undos = 0;   ///< each restored the volumes before the last stroke
-  std::uint64_t redos = 0;   ///< each repeated a stroke that was undone
+  std::optional<PulpHeat> pulp;  ///< since then too; empty: the scene does not ask for it
+  std::uint64_t resets = 0;      ///< of the volumes; before arming too
+  std::uint64_t undos = 0;       ///< each restored the volumes before the last stroke
+  std::uint64_t redos = 0;       ///< each repeated a stroke that was undone
   std::uint64_t allocations = 0;
   ThreadFaults faults_of_pages;
 

@@ -266,6 +266,15 @@ std::vector<double> removed_mm3(const LoadedScene& scene, const CompiledScene& s
   return removed;
 }
 
+/// The mark that the scene asks for.
+std::optional<PulpHeat> pulp_heat(const SceneSettings& scene) {
+  if (scene.cut.pulp == PulpMark::off) return std::nullopt;
+  const auto water_c =
+      scene.cut.pulp == PulpMark::water ? std::optional(scene.cut.water_c) : std::nullopt;
+  return PulpHeat({scene.spindle.stall_torque_n_mm, kReferenceSpeedKrpm}, water_c,
+                  1.0 / scene.servo.rate_hz);
+}
+
 /// Scores of each material of the scene, since the last reset.
 MaterialScores scores_of(const LoadedScene& scene, const std::vector<double>& removed,
                          const RunRecord& record) {
@@ -401,6 +410,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
     accept_rights(report.missing_rights, options.real_time.strict);
   }
 
+  report.record.pulp = pulp_heat(scene);
   segment.set_lifecycle(Lifecycle::run);
   report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
   const EndReason end =

@@ -76,6 +76,20 @@ std::string bur_line(const RunReport& report) {
   return text + "\n";
 }
 
+Json pulp_of(const RunRecord& record) {
+  if (!record.pulp) return nullptr;
+  return {{"end", record.pulp->rise_c()},
+          {"highest", record.pulp->highest_c()},
+          {"harm_s", record.pulp->harm_s()}};
+}
+
+std::string pulp_line(const RunRecord& record) {
+  if (!record.pulp) return {};
+  const PulpHeat& pulp = *record.pulp;
+  return format("  pulp       %+.1f C, highest %+.1f C, harmed (%+.1f C) for %.1f s\n",
+                pulp.rise_c(), pulp.highest_c(), PulpHeat::kHarmC, pulp.harm_s());
+}
+
 /// A scan is larger than the workspace: its tool, and what it removes, are so, too.
 std::string scale_line(const RunReport& report) {
   if (report.workspace_scale <= 1) return {};
@@ -192,6 +206,7 @@ std::string report_json(const RunReport& report) {
       {"removed_density_mm3", report.removed_density_mm3},
       {"forbidden_ms", forbidden_of(report.materials)},
       {"sharpness", r.sharpness},
+      {"pulp_rise_c", pulp_of(r)},
       {"resets", r.resets},
       {"undos", r.undos},
       {"redos", r.redos},
@@ -238,7 +253,8 @@ std::string summary(const RunReport& report) {
   if (r.resets > 0) {
     text += format(" since the last of %llu resets", static_cast<unsigned long long>(r.resets));
   }
-  text += "\n" + score_lines(report.materials) + bur_line(report) + scale_line(report);
+  text +=
+      "\n" + score_lines(report.materials) + bur_line(report) + pulp_line(r) + scale_line(report);
   text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
                  static_cast<unsigned long long>(r.stale_ticks),
                  static_cast<unsigned long long>(r.overruns),

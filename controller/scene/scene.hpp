@@ -136,6 +136,9 @@ struct BurSettings {
   std::optional<double> force_exponent, speed_exponent, saturation_n, wear_half_n_s;
 };
 
+/// Whether the temperature of the pulp is a mark, and how the tooth is prepared (docs/cutting.md).
+enum class PulpMark : std::uint8_t { off, dry, water };
+
 /// The filter against a volume's noise: a word, or how many passes of it.
 enum class Denoise : std::int8_t { automatic = -1, off = 0 };
 inline constexpr std::array<std::string_view, 2> kDenoiseWords = {"auto", "off"};
@@ -187,6 +190,8 @@ struct CutSettings {
   /// Press at which a bur removes as much as by Preston's law, whatever its exponent: 1 N at the
   /// device once `fit` has changed the scene's forces.
   double reference_n = 1;
+  PulpMark pulp = PulpMark::off;
+  double water_c = 23;  ///< of the spray: a surgery's room temperature
 };
 
 /// [spindle]: turns the tool in the model preston; an air turbine.
@@ -295,6 +300,7 @@ inline constexpr std::array<std::string_view, 3> kForceModelWords = {"paper", "p
 inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
                                                                    "overlap_exact", "preston"};
 inline constexpr std::array<std::string_view, 3> kCutPedalWords = {"auto", "always", "button"};
+inline constexpr std::array<std::string_view, 3> kPulpMarkWords = {"off", "dry", "water"};
 inline constexpr std::array<std::string_view, 4> kGritWords = {"none", "medium", "coarse",
                                                                "super-coarse"};
 inline constexpr std::array<std::string_view, 2> kNumericWords = {"fixed", "double"};

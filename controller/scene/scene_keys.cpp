@@ -141,6 +141,7 @@ constexpr SceneCondition kPreston{"cut.model", "preston"};
 constexpr SceneCondition kNoPreston{
     "cut.model", "preston", false,
     " is of the model overlap; leave it out, or set model = \"overlap\""};
+constexpr SceneCondition kWater{"cut.pulp", "water"};
 constexpr SceneCondition kSpindle{
     "cut.model", "preston", true,
     " turns nothing: only cut.model = \"preston\" has a spindle; leave it out"};
@@ -324,6 +325,10 @@ constexpr SceneKey kKeys[] = {
      "force that cuts nothing yet", kPreston},
     {"cut.friction", "", at<&CutSettings::friction>, between(0, 2),
      "tangential over normal force of the bur", kPreston},
+    {"cut.pulp", "", at<&CutSettings::pulp>, one_of(kPulpMarkWords),
+     "how warm the pulp becomes, as a mark that no force depends on: of a dry preparation, or with a spray of water (docs/cutting.md)",
+     kPreston, {.json = InJson::if_changed}},
+    {"cut.water_c", "C", at<&CutSettings::water_c>, between(0, 60), "temperature of the spray", kWater},
 
     {"spindle.speed_krpm", "1000/min", at<&SpindleSettings::speed_krpm>, between(0, 500),
      "without load; 0: it stands, and nothing is cut", kSpindle},

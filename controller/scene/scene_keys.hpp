@@ -32,7 +32,7 @@ using SceneSlot =
                  std::optional<double>*, std::optional<std::array<double, 2>>*,
                  std::optional<std::array<double, 3>>*, std::optional<std::array<double, 4>>*,
                  std::optional<VoxelGrid>*, Personality*, ForceModel*, CutModel*, CutPedal*, Grit*,
-                 NumericKind*, GradientKernel*, Denoise*, LawChoice*>;
+                 PulpMark*, NumericKind*, GradientKernel*, Denoise*, LawChoice*>;
 
 /// Both ends are allowed values.
 struct Range {

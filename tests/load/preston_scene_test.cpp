@@ -162,6 +162,24 @@ TEST_CASE("a law that no bur has, or that has no effect, is refused in one line"
         "leave it out");
 }
 
+TEST_CASE("the temperature of the pulp is a mark that a scene asks for, with water of its own") {
+  CHECK(parse("").cut.pulp == PulpMark::off);
+  CHECK(parse("[cut]\npulp = \"dry\"\n").cut.pulp == PulpMark::dry);
+  const SceneSpec wet = parse("[cut]\npulp = \"water\"\nwater_c = 35\n");
+  CHECK(wet.cut.pulp == PulpMark::water);
+  CHECK(wet.cut.water_c == 35);
+  CHECK(error_after("[cut]\nwater_c = 35\n").starts_with("x.toml:7: cut.water_c = 35"));
+  CHECK(error_after("[cut]\npulp = \"water\"\nwater_c = 61\n").ends_with("use 0 to 60"));
+  CHECK(error_after("[cut]\npulp = \"wet\"\n").starts_with("x.toml:7: cut.pulp = \"wet\""));
+  CHECK(error_after("[cut]\nmodel = \"overlap\"\npulp = \"dry\"\n")
+            .starts_with("x.toml:8: cut.pulp = \"dry\""));
+  LoadedScene scene = block_scene();
+  const std::string before = canonical_json(scene);
+  CHECK(before.find("water_c") == std::string::npos);
+  scene.cut.pulp = PulpMark::dry;
+  CHECK(canonical_json(scene) != before);
+}
+
 TEST_CASE("the scene's identity holds the law of a bur that has one, and is else as ever") {
   LoadedScene scene = block_scene();
   const std::string before = canonical_json(scene);

@@ -3,10 +3,13 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include <doctest/doctest.h>
 
 #include "controller/scene/scene_presets.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "shared/segment/pulp_heat.hpp"
 #include "tests/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
@@ -19,8 +22,8 @@ namespace {
 
 constexpr double kNewtonsPerGram = 9.80665e-3;
 
-/// A block of machinable glass ceramic under a ball of radius 1 mm.
-LoadedScene bench(Grit grit, double krpm) {
+/// A block of machinable glass ceramic under a ball.
+LoadedScene bench(Grit grit, double krpm, double radius_mm = 1) {
   LoadedScene scene = half_space_scene(8);
   scene.volumes[0] = volume_of(64, kVoxelMm, [](double, double y_mm, double) { return y_mm / 2; });
   scene.cut.model = CutModel::preston;
@@ -31,6 +34,7 @@ LoadedScene bench(Grit grit, double krpm) {
   scene.spindle.speed_krpm = krpm;
   scene.spindle.stall_torque_n_mm = 30;  // that of an electric handpiece: it holds its speed
   scene.spindle.inertia_g_mm2 = 45;
+  scene.tools[0] = make_tool("bur", "ball", {.pitch_mm = kVoxelMm, .radius_mm = radius_mm});
   scene.tools[0].law = grit_law(grit);
   return scene;
 }
@@ -86,6 +90,43 @@ TEST_CASE(
   // 3.3 to 5.3 mm^3/s, at a load that was not published.
   CHECK(medium[1].mm3_per_s > 3.3);
   CHECK(medium[1].mm3_per_s < 5.3);
+}
+
+TEST_CASE(
+    "60 s of preparation warm the pulp as published, dry and with water, and feed back nowhere") {
+  constexpr double kKrpm = 200, kGrams = 75;
+  const LoadedScene scene = bench(Grit::medium, kKrpm, 0.7);
+  CuttingHand miller(scene, {-1, 1, 0});
+  const HeatingSpindle spindle{scene.spindle.stall_torque_n_mm, kReferenceSpeedKrpm};
+  constexpr int kSettleMs = 100, kMs = 500;
+  double proxy_mm = 0.7, power_w = 0;
+  for (int ms = 0; ms < kMs; ++ms) {
+    const double down_mm = kGrams * kNewtonsPerGram / scene.force.stiffness_n_per_mm;
+    const ServoOutput out = miller.step({-std::cos(0.015 * ms), proxy_mm - down_mm, 0});
+    proxy_mm = out.position_mm[1] + out.proxy_offset_mm[1];
+    if (ms < kSettleMs) continue;
+    power_w += spindle.power_w(out.spindle_load, out.spindle_ratio) / (kMs - kSettleMs);
+  }
+  const auto after_60_s = [&](std::optional<double> water_c) {
+    PulpHeat pulp(spindle, water_c, 0.01);
+    constexpr double kRatio = kKrpm / kReferenceSpeedKrpm;
+    for (int i = 0; i < 6000; ++i) {
+      pulp.add(power_w / spindle.power_w(1, kRatio), kRatio);
+      pulp.advance();
+    }
+    return pulp.rise_c();
+  };
+  struct Mean {
+    std::optional<double> water_c;
+    double rise_c;
+  };
+  constexpr std::array<Mean, 4> kPublished{{{{}, 6.8}, {10.0, -16.3}, {23.0, -8.6}, {35.0, 1.6}}};
+  for (const auto& [water_c, published_c] : kPublished) {
+    const double rise_c = after_60_s(water_c);
+    MESSAGE(power_w, " W, water ", water_c.value_or(-1), ": ", rise_c, " C, published ",
+            published_c);
+    CHECK(std::abs(rise_c - published_c) < 0.5 * std::abs(published_c));
+  }
 }
 
 TEST_CASE("39 mm of ceramic at 147.5 g take half, 35 and 25 % of the rate of the three grits") {

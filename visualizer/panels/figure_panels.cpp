@@ -225,8 +225,8 @@ void curve(const char* label, const char* format, const std::vector<ForcePlot::P
 void material_rows(const OverlayFigures& figures) {
   const std::vector<ScoreRow>& score = figures.score;
   if (!score.empty() && figures.score_is_partial) panel_row("materials", "%s", "since joining");
-  const std::size_t shown =
-      std::min(score.size(), figures.second ? kMostBesideSecond : kMostMaterials);
+  const std::size_t most = figures.second ? kMostBesideSecond : kMostMaterials;
+  const std::size_t shown = std::min(score.size(), figures.pulp_rise_c ? most - 1 : most);
   for (std::size_t i = 0; i < shown; ++i) {
     const ScoreRow& material = score[i];
     ImGui::TableNextRow();
@@ -294,7 +294,12 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
       panel_row(shortened("touched " + figures.forbidden, kWidestLabel * unit_px()).c_str(),
                 "%.0f ms", figures.forbidden_ms, touched ? kAlert : kValueColour);
     }
-    const bool has_room = figures.score.size() <= kFewMaterials && !figures.second;
+    if (figures.pulp_rise_c) {
+      panel_row("pulp", "%+.1f C", *figures.pulp_rise_c,
+                figures.pulp_harmed ? kAlert : kValueColour);
+    }
+    const bool has_room =
+        figures.score.size() <= kFewMaterials && !figures.second && !figures.pulp_rise_c;
     const bool rates = !figures.slices && !plots && has_room;
     if (rates && figures.tick_rate_hz) panel_row("servo", "%.0f Hz", *figures.tick_rate_hz);
     if (rates && figures.frame_rate_hz) panel_row("picture", "%.0f /s", *figures.frame_rate_hz);

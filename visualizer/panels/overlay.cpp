@@ -37,6 +37,7 @@ OverlayFigures OverlayFigures::rounded() const {
   shown.force_n = rounded_to(0.01, force_n);
   if (second) shown.second->force_n = rounded_to(0.01, second->force_n);
   shown.removed_mm3 = rounded_to(0.01, removed_mm3);
+  if (pulp_rise_c) shown.pulp_rise_c = rounded_to(0.1, *pulp_rise_c);
   if (tick_rate_hz) shown.tick_rate_hz = rounded_to(1.0, *tick_rate_hz);
   if (frame_rate_hz) shown.frame_rate_hz = rounded_to(1.0, *frame_rate_hz);
   if (spindle) {

@@ -92,6 +92,8 @@ struct OverlayFigures {
   std::string forbidden;                  ///< which of them may not be cut; empty: none
   double forbidden_ms = 0.0;              ///< they were pressed upon for so long
   std::optional<SpindleFigures> spindle;  ///< none: the scene's removal has no spindle
+  std::optional<double> pulp_rise_c;      ///< of the tooth, as a mark; none: the scene has none
+  bool pulp_harmed = false;               ///< it has been too warm
   std::optional<double> tick_rate_hz;
   std::optional<double> frame_rate_hz;
   std::optional<double> data_age_ms;

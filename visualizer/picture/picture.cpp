@@ -399,6 +399,10 @@ OverlayFigures overlay_figures(const Session& session) {
     figures.forbidden += (figures.forbidden.empty() ? "" : ", ") + material.name;
   }
   figures.forbidden_ms = session.forbidden_ms();
+  if (const auto& pulp = session.pulp()) {
+    figures.pulp_rise_c = pulp->rise_c();
+    figures.pulp_harmed = pulp->harm_s() > 0;
+  }
   figures.tick_rate_hz = session.tick_rate_hz();
   figures.data_age_ms = session.data_age_ms();
   if (session.ended()) {

@@ -155,6 +155,21 @@ const VolumeView& SceneView::main_volume() const {
   return solid != volumes.end() ? *solid : volumes.front();
 }
 
+namespace {
+
+/// The mark that the scene asks for.
+std::optional<PulpHeat> pulp_heat(const Json& scene, std::uint32_t tick_ns) {
+  if (!scene.contains("cut") || !scene.at("cut").contains("pulp")) return std::nullopt;
+  const Json& cut = scene.at("cut");
+  std::optional<double> water_c;
+  if (cut.contains("water_c")) water_c = cut.at("water_c").get<double>();
+  HeatingSpindle spindle;
+  spindle.stall_torque_n_mm = scene.at("spindle").at("stall_torque_n_mm").get<double>();
+  return PulpHeat(spindle, water_c, tick_ns * 1e-9);
+}
+
+}  // namespace
+
 SceneView scene_view(const SegmentInfo& segment) {
   SceneView scene;
   scene.arms = segment.arms;
@@ -169,6 +184,7 @@ SceneView scene_view(const SegmentInfo& segment) {
     for (const Json& tool : text.at("tools")) scene.tools.push_back(tool_view(tool));
     if (text.contains("device")) scene.device = device_frame(text.at("device"));
     scene.has_spindle = text.contains("spindle");
+    scene.pulp = pulp_heat(text, segment.tick_ns);
     for (const Json& one : text.at("materials")) scene.materials.push_back(material_view(one));
   } catch (const JsonError& problem) {
     throw VisualizerError("segment scene: " + std::string(problem.what()) +

@@ -12,6 +12,7 @@
 
 #include <glm/glm.hpp>
 
+#include "shared/segment/pulp_heat.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/volume/brick_grid.hpp"
 #include "visualizer/scene/camera.hpp"
@@ -96,6 +97,7 @@ struct SceneView {
   bool voxel_tool = false;                     ///< the tool of each arm is one volume more
   bool normals = false;                        ///< colours are normals in eye space (`SeenBodies`)
   bool has_spindle = false;                    ///< force cuts, and something turns the tool
+  std::optional<PulpHeat> pulp;                ///< before the first tick; empty: no such mark
 
   /// Of the boxes of all volumes.
   [[nodiscard]] std::vector<glm::dvec3> corners() const;

@@ -93,7 +93,8 @@ Session::Session(std::string_view name)
       scene_(scene_view(connection_.reader().info())),
       cut_before_(connection_.reader().dirty_head() != 0),
       snapshots_(scene_.volumes.size()),
-      removed_volume_(removed_since_now()) {
+      removed_volume_(removed_since_now()),
+      pulp_(scene_.pulp) {
   poll();
   on_the_way_.clear();
   oldest_removal_ns_.reset();
@@ -138,10 +139,16 @@ void Session::read_states() {
   for (; next_state_ < head; ++next_state_) {
     if (reader.state_at(next_state_, record) != ReadState::ok) continue;
     std::uint32_t flags = record.flags;  // of all arms
-    if (const auto second = reader.second_of(record)) flags |= second->flags;
+    const auto second = reader.second_of(record);
+    if (second) flags |= second->flags;
     if (!armed_ && (flags & kFlagStarted) != 0) armed_ = record.tick;
     if ((flags & kFlagReset) != 0) forbidden_ticks_ = 0;
     if ((flags & kFlagForbidden) != 0) ++forbidden_ticks_;
+    if (!pulp_) continue;
+    if ((flags & kFlagReset) != 0) pulp_->restart();
+    pulp_->add(record.spindle_load, record.spindle_ratio);
+    if (second) pulp_->add(second->spindle_load, second->spindle_ratio);
+    pulp_->advance();
   }
   const auto newest = reader.latest();
   if (!newest) return;

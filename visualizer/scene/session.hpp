@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "shared/segment/connection.hpp"
+#include "shared/segment/pulp_heat.hpp"
 #include "shared/volume/material.hpp"
 #include "visualizer/scene/frame_report.hpp"
 #include "visualizer/scene/scene_view.hpp"
@@ -83,6 +84,8 @@ class Session {
   }
   /// How long what may not be cut was pressed upon, by any arm, since then too.
   [[nodiscard]] double forbidden_ms() const noexcept;
+  /// The temperature of the pulp since then too, if the scene asks for it.
+  [[nodiscard]] const std::optional<PulpHeat>& pulp() const noexcept { return pulp_; }
   /// Something had been cut before it joined, which `removed_by_material_mm3` lacks.
   [[nodiscard]] bool cut_before() const noexcept { return cut_before_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
@@ -138,6 +141,7 @@ class Session {
   std::vector<DirtyRecord> on_the_way_;  ///< removals whose bricks no snapshot holds yet
   std::optional<std::uint64_t> oldest_removal_ns_;
   std::uint64_t forbidden_ticks_ = 0;
+  std::optional<PulpHeat> pulp_;
   double attach_ms_ = 0.0;
 };
 

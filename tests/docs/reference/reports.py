@@ -36,6 +36,7 @@ REPORTS = [
         ("removed_density_mm3", "mm3", "density taken away over full density, since the last reset, by all arms"),
         ("forbidden_ms", "ms", "how long each forbidden material was touched"),
         ("sharpness", "", "rate of the bur in the hand at the end over that of a new one (docs/cutting.md)"),
+        ("pulp_rise_c", "C", "how much warmer the pulp is than the body, with `cut.pulp` (docs/cutting.md): at the `end`, `highest`, and for how long above the harmful 5.5 (`harm_s`); else null"),
         ("resets, undos, redos", "", "of the volumes; of one stroke each"),
         ("energy_j", "J", "work at the device port: positive is taken from the hand"),
         ("port_minimum_j", "J", "its lowest value: below 0 the loop gave more than it took"),

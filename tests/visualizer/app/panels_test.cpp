@@ -31,6 +31,7 @@ OverlayFigures crowded() {
   figures.forbidden = "pulp, nerve";
   figures.forbidden_ms = 121.0;
   figures.spindle = {281.0, 0.34};
+  figures.pulp_rise_c = -16.3;
   figures.tick_rate_hz = 1000.0;
   figures.frame_rate_hz = 60.0;
   figures.data_age_ms = 1.0;

@@ -22,11 +22,14 @@ namespace {
 constexpr std::uint16_t kArmed = 2, kFault = 5;
 constexpr std::uint32_t kOverspeed = 3;
 
-constexpr const char* kScene = R"({
+const std::string kScene = R"({
   "volumes": [{"name": "block", "solid": true}],
   "tools": [{"name": "ball", "profile": [[-2, 0], [0, 2], [2, 0]]},
             {"name": "pin", "profile": [[0, 0], [6, 0.8]]}],
   "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]}]})";
+/// The same with the temperature of the pulp as a mark.
+const std::string kWarmScene =
+    R"({"cut": {"pulp": "dry"}, "spindle": {"stall_torque_n_mm": 3},)" + kScene.substr(1);
 
 TickRecord at(double x_mm, std::uint32_t tool) {
   TickRecord record{};
@@ -38,13 +41,13 @@ TickRecord at(double x_mm, std::uint32_t tool) {
 }
 
 struct Run {
-  explicit Run(std::size_t arms = 2)
-      : writer(SegmentWriter::create(spec(arms))), server("two", writer) {
+  explicit Run(std::size_t arms = 2, const std::string& scene = kScene)
+      : writer(SegmentWriter::create(spec(arms, scene))), server("two", writer) {
     writer.set_lifecycle(Lifecycle::run);
   }
-  [[nodiscard]] SegmentSpec spec(std::size_t arms) const {
+  [[nodiscard]] SegmentSpec spec(std::size_t arms, const std::string& scene) const {
     SegmentSpec out = spec_of(volume);
-    out.scene_json = kScene;
+    out.scene_json = scene;
     out.arms = arms;
     return out;
   }
@@ -194,6 +197,30 @@ TEST_CASE("what may not be cut counts once a tick, whichever arm presses on it")
   run.publish(at(1, 0), presses);
   session.poll();
   CHECK(session.forbidden_ms() == doctest::Approx(1));
+}
+
+TEST_CASE("both arms' spindles warm the pulp, tick by tick, until the volumes are reset") {
+  Run run(2, kWarmScene);
+  Session session("two");
+  TickRecord cuts = at(1, 0);
+  cuts.spindle_load = 0.5F;
+  cuts.spindle_ratio = 1;
+  for (int i = 0; i < 10; ++i) run.publish(cuts, cuts);
+  session.poll();
+  REQUIRE(session.pulp());
+  // 2 x 0.5 x 3 N mm x 31416 / s = 94.2 W for 10 ms.
+  CHECK(session.pulp()->rise_c() == doctest::Approx(PulpHeat::kPerJ * 94.25 * 0.01).epsilon(1e-3));
+  CHECK(overlay_figures(session).pulp_rise_c == session.pulp()->rise_c());
+  TickRecord reset = at(1, 0);
+  reset.flags |= kFlagReset;
+  run.publish(reset, reset);
+  session.poll();
+  CHECK(session.pulp()->rise_c() == 0);
+}
+
+TEST_CASE("a scene without the mark of the pulp has none in the window") {
+  Run run;
+  CHECK(!Session("two").pulp());
 }
 
 TEST_CASE("a run counts as armed from the first arm that is taken in hand") {
