@@ -9,6 +9,7 @@
 
 #include "controller/law/registry/law_registry.hpp"
 #include "hil/hil_error.hpp"
+#include "lab/impedance/logged_wall.hpp"
 #include "lab/impedance/shaken_arm.hpp"
 #include "lab/impedance/spectrum.hpp"
 #include "lab/run/lab_command.hpp"
@@ -31,6 +32,10 @@ constexpr std::array kAxes{AxisId::loop,  AxisId::device,     AxisId::damping,  
                            AxisId::mass,  AxisId::estimator,  AxisId::filter,   AxisId::numeric,
                            AxisId::law,   AxisId::stabiliser, AxisId::limits};
 
+/// Those of them that no recording has.
+constexpr std::array kOfDevice{AxisId::device,   AxisId::delay,   AxisId::quantum,
+                               AxisId::friction, AxisId::viscous, AxisId::mass};
+
 /// `kerf-lab impedance`: what a hand feels of a wall over frequency, by theory and from motion.
 class ImpedanceCommand final : public LabCommand {
  public:
@@ -38,13 +43,17 @@ class ImpedanceCommand final : public LabCommand {
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
-  /// The wall and its device, nothing measured yet.
-  [[nodiscard]] Spectrum subject(std::ostream& out) const;
+  /// The wall and its device, nothing measured yet; `log`: of a recording.
+  [[nodiscard]] Spectrum subject(const LoggedWall* log, std::ostream& out) const;
+  /// Puts what a recording has in the place of axes. Throws HilError for one that is given, too.
+  void take_log(const LoggedWall& wall, std::array<std::string, zwidth::kAxisCount>& texts) const;
+  [[nodiscard]] SineResult row_at(double hz, const Spectrum& spectrum, const LoggedWall* log,
+                                  const LoadedScene* walls) const;
   [[nodiscard]] std::vector<double> frequencies(double rate_hz) const;
 
   std::array<std::string, zwidth::kAxisCount> axes_, option_names_;
-  std::string direction_, frequency_, json_, plot_;
-  double stiffness_ = 1, amplitude_ = 0.5;
+  std::string direction_, frequency_, log_, json_, plot_;
+  std::optional<double> stiffness_, amplitude_;
   bool arm_ = false;
 };
 
@@ -70,11 +79,13 @@ ImpedanceCommand::ImpedanceCommand(Arguments& program)
               "Nyquist frequency, 25]")
       .shown_as("Hz");
   app_.option("--amplitude", amplitude_,
-              "of the motion, mm, or less as far as the limits of the force need")
-      .within(kLeastMm, 10)
-      .shows_default();
+              "of the motion, mm, or less as far as the limits of the force need [0.5]")
+      .within(kLeastMm, 10);
   app_.flag("--arm", arm_,
             "the whole servo step with an emulated device in a stiff hand in place of one axis");
+  app_.option("--log", log_,
+              "measure nothing: the wall of a recording, from the motion that it has in contact")
+      .shown_as("DIR");
   app_.option("--json", json_, "write axes, margins and a row for each frequency").shown_as("FILE");
   app_.option("--plot", plot_, "draw stiffness and damping over frequency (SVG)").shown_as("FILE");
   app_.footer(
@@ -83,8 +94,35 @@ ImpedanceCommand::ImpedanceCommand(Arguments& program)
       "Exit codes: 0 fine, 2 bad input or set-up.");
 }
 
-Spectrum ImpedanceCommand::subject(std::ostream& out) const {
+void ImpedanceCommand::take_log(const LoggedWall& wall,
+                                std::array<std::string, zwidth::kAxisCount>& texts) const {
+  for (const AxisId axis : kAxes) {
+    if (texts[zwidth::index_of(axis)].empty() ||
+        std::ranges::find(kOfDevice, axis) != kOfDevice.end()) {
+      continue;
+    }
+    throw HilError(std::string("--") + zwidth::axis_kinds()[zwidth::index_of(axis)].name +
+                   ": the scene of the recording has it; leave it out");
+  }
+  if (stiffness_ || amplitude_ || arm_) {
+    throw HilError(std::string(stiffness_   ? "--stiffness"
+                               : amplitude_ ? "--amplitude"
+                                            : "--arm") +
+                   ": the recording has its own; leave it or --log out");
+  }
+  if (wall.law != "coupling") {
+    throw HilError("--log: the force of its scene is " + wall.law +
+                   ", of which no stiffness is known; give a recording of the coupling");
+  }
+  texts[zwidth::index_of(AxisId::rate)] = format("%.9g", wall.rate_hz);
+  texts[zwidth::index_of(AxisId::damping)] = format("%.9g", wall.damping_ns_per_mm);
+  texts[zwidth::index_of(AxisId::estimator)] = wall.estimator;
+  texts[zwidth::index_of(AxisId::stabiliser)] = wall.stabiliser;
+}
+
+Spectrum ImpedanceCommand::subject(const LoggedWall* log, std::ostream& out) const {
   std::array<std::string, zwidth::kAxisCount> texts = axes_;
+  if (log != nullptr) take_log(*log, texts);
   zwidth::take_device_option(direction_, arm_, texts, out);
   Spectrum spectrum;
   for (const AxisId axis : kAxes) {
@@ -109,7 +147,8 @@ Spectrum ImpedanceCommand::subject(std::ostream& out) const {
   }
   zwidth::check_filter(spectrum.values);
   spectrum.subject = zwidth::subject_of(spectrum.values);
-  spectrum.stiffness_n_per_mm = stiffness_;
+  spectrum.stiffness_n_per_mm = log != nullptr ? log->stiffness_n_per_mm : stiffness_.value_or(1);
+  if (log != nullptr) spectrum.unmeasured = "not in the motion of the log";
   return spectrum;
 }
 
@@ -132,26 +171,40 @@ std::vector<double> ImpedanceCommand::frequencies(double rate_hz) const {
       frequency_.empty() ? format("1:%g:25", rate_hz / 4) : frequency_);
 }
 
+SineResult ImpedanceCommand::row_at(double hz, const Spectrum& spectrum, const LoggedWall* log,
+                                    const LoadedScene* walls) const {
+  const zwidth::LoopCase& subject = spectrum.subject;
+  constexpr double kMostMm = 0.5;
+  const double most_mm = amplitude_.value_or(kMostMm), k = spectrum.stiffness_n_per_mm;
+  try {
+    if (log != nullptr) return logged_at(*log, subject.loop, hz);
+    if (walls != nullptr) return measure_arm(*walls, subject, k, hz, most_mm);
+    return measure_one_axis(subject, k, sine_near(hz, 1 / subject.loop.period_s), most_mm);
+  } catch (const LawError& error) {
+    throw HilError("--law: " + subject.force_law.name + error.what());
+  }
+}
+
 int ImpedanceCommand::run(std::ostream& out) const {
   const LabOutput as_json("--json", json_, ".json"), as_plot("--plot", plot_, ".svg");
   LabOutput::check_distinct({&as_json, &as_plot});
   if (!plot_.empty()) check_can_plot();
-  Spectrum spectrum = subject(out);
-  const double rate_hz = 1 / spectrum.subject.loop.period_s;
-  const std::optional<LoadedScene> walls = arm_ ? std::optional(walls_of(spectrum)) : std::nullopt;
-  for (const double hz : frequencies(rate_hz)) {
-    try {
-      spectrum.rows.push_back(
-          walls
-              ? measure_arm(*walls, spectrum.subject, stiffness_, hz, amplitude_)
-              : measure_one_axis(spectrum.subject, stiffness_, sine_near(hz, rate_hz), amplitude_));
-    } catch (const LawError& error) {
-      throw HilError("--law: " + spectrum.subject.force_law.name + error.what());
-    }
+  std::optional<LoggedWall> log;
+  if (!log_.empty()) log = read_logged_wall(log_);
+  Spectrum spectrum = subject(log ? &*log : nullptr, out);
+  std::optional<LoadedScene> walls;
+  if (arm_) walls = walls_of(spectrum);
+  for (const double hz : frequencies(1 / spectrum.subject.loop.period_s)) {
+    spectrum.rows.push_back(row_at(hz, spectrum, log ? &*log : nullptr, walls ? &*walls : nullptr));
   }
   if (std::ranges::none_of(spectrum.rows, [](const auto& row) { return row.wall.has_value(); })) {
+    if (log) {
+      throw HilError("--log: " + log_ +
+                     ": no frequency has enough motion; record a hand that shakes within a wall, "
+                     "or give another --frequency");
+    }
     throw HilError("--limits: peak and slew of the force leave no motion at " +
-                   number_text(stiffness_) +
+                   number_text(spectrum.stiffness_n_per_mm) +
                    " N/mm; add --limits off, or give less stiffness or damping");
   }
   out << text_of(spectrum);

@@ -99,7 +99,7 @@ std::string text_of(const Spectrum& spectrum) {
       text += format("%10.4g%10.3g %9.2f%8.2f", felt_stiffness(*row.wall, row.hz), row.wall->real(),
                      100 * off.ratio, off.deg);
     } else {
-      text += format("%38s", "beyond the limits of the force");
+      text += format("%38s", spectrum.unmeasured.c_str());
     }
     text += format(" %11.4g%10.3g\n", felt_stiffness(port, row.hz), port.real());
   }

@@ -20,7 +20,8 @@ struct Spectrum {
   zwidth::Assignment values;  ///< of the axes
   zwidth::LoopCase subject;
   double stiffness_n_per_mm = 0;
-  std::vector<SineResult> rows;  ///< by frequency, rising
+  std::string unmeasured = "beyond the limits of the force";  ///< why a row has no wall
+  std::vector<SineResult> rows;                               ///< by frequency, rising
 
   /// Wall and device's port by theory, in the motion of a row.
   [[nodiscard]] Impedance wall_by_theory(const SineResult& row) const;

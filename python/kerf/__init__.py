@@ -17,9 +17,9 @@ from .interrupted import Interrupted
 from .log import Log, Replay, replay
 from .loop import Loop
 from .scene import Scene
-from .stability import Cell, Map, cell, map_loop, zwidth
+from .stability import Cell, Impedance, Map, cell, impedance, map_loop, zwidth
 
-__all__ = ["Cell", "Device", "DeviceState", "Error", "Interrupted", "LawInput", "Log", "Loop", "Map", "Phase", "Replay", "ReplayDifference",
+__all__ = ["Cell", "Device", "DeviceState", "Error", "Impedance", "Interrupted", "LawInput", "Log", "Loop", "Map", "Phase", "Replay", "ReplayDifference",
            "SampledHand", "SampledLoop", "Scene", "Segment", "SegmentError", "State", "TICK", "Verdict", "__version__", "cell", "device_loop",
-           "highest_damping", "highest_stiffness", "is_stable", "map_loop", "passive_stiffness", "passive_viscosity", "quantum_stiffness", "replay",
+           "highest_damping", "highest_stiffness", "impedance", "is_stable", "map_loop", "passive_stiffness", "passive_viscosity", "quantum_stiffness", "replay",
            "zwidth"]

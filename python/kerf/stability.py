@@ -86,6 +86,34 @@ def map_loop(device, rate_hz=1000.0, direction=""):
     return _kerf.column_loop([(name, _text(name, value)) for name, value in axes.items()], direction)
 
 
+@dataclasses.dataclass(frozen=True)
+class Impedance:
+    """What a hand feels over frequency, by theory. hz: float64 (F,). wall, port: complex128 (F,), force over velocity in N s/mm, of
+    the wall, and of wall and device. Their real part is the damping that is felt."""
+    hz: np.ndarray
+    wall: np.ndarray
+    port: np.ndarray
+
+    def stiffness_n_per_mm(self, of):
+        """The stiffness that is felt of self.wall or self.port: float64 (F,)."""
+        return -2 * np.pi * self.hz * of.imag
+
+
+def impedance(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_hz=1000.0, direction="", loop=None, hz=None,
+              amplitude_mm=0.5):
+    """Wall and port as a hand feels them that moves the tip as a sine within the wall: the theory's rows of `kerf lab impedance`.
+
+    The wall is the linear one with the backward difference (docs/theory.md 5.8). device, rate_hz, direction: whose loop, map_loop,
+    unless `loop`, a kerf.SampledLoop, is given. hz: frequencies; if None, 100 of them from 1 Hz to half of the Nyquist frequency.
+    amplitude_mm: of the motion, in which Coulomb friction counts. Returns a kerf.Impedance. Raises kerf.Error."""
+    loop = loop if loop is not None else map_loop(device, rate_hz, direction)
+    hz = np.geomspace(1, 0.25 / loop.period_s, 100) if hz is None else np.atleast_1d(np.asarray(hz, float))
+    if not (hz.ndim == 1 and (hz > 0).all() and (hz < 0.5 / loop.period_s).all() and amplitude_mm > 0):
+        raise _kerf.Error("hz, amplitude_mm: give frequencies between 0 and half of the rate, and a positive amplitude")
+    wall = _kerf.wall_impedance(loop, stiffness_n_per_mm, damping_ns_per_mm, hz)
+    return Impedance(hz, wall, wall + _kerf.device_impedance(loop, hz, amplitude_mm))
+
+
 def _text(name, values):
     if isinstance(values, str):
         return values

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <pybind11/complex.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
@@ -158,6 +159,25 @@ void define_stability(py::module_& module) {
       },
       py::arg("loop"), py::arg("stiffness_n_per_mm"), py::arg("damping_ns_per_mm"),
       "The device damping (N s/mm) above which the wall is passive.");
+  module.def(
+      "wall_impedance",
+      [=](const SampledLoop& loop, double stiffness, double damping,
+          const py::array_t<double>& hz) {
+        sound(loop);
+        return py::vectorize(
+            [&](double at) { return wall_impedance(loop, stiffness, damping, at); })(hz);
+      },
+      py::arg("loop"), py::arg("stiffness_n_per_mm"), py::arg("damping_ns_per_mm"), py::arg("hz"),
+      "Force over velocity of the wall as a hand feels it, N s/mm, at each frequency.");
+  module.def(
+      "device_impedance",
+      [=](const SampledLoop& loop, const py::array_t<double>& hz, double amplitude_mm) {
+        sound(loop);
+        return py::vectorize([&](double at) { return device_impedance(loop, at, amplitude_mm); })(
+            hz);
+      },
+      py::arg("loop"), py::arg("hz"), py::arg("amplitude_mm"),
+      "That of the device, with its friction in a motion of this amplitude.");
 
   py::class_<LimitCycle>(module, "Verdict", "The verdict on a run, or on the worst run of a cell.")
       .def_readonly("swings", &LimitCycle::swings, "the tip oscillates on, or the run cannot go on")

@@ -1,17 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <numeric>
 #include <string>
 #include <utility>
 
 #include <doctest/doctest.h>
+#include <kerf/hand.hpp>
+#include <kerf/log.hpp>
+#include <kerf/scene.hpp>
+#include <kerf/servo.hpp>
 
+#include "lab/impedance/logged_wall.hpp"
 #include "lab/impedance/shaken_arm.hpp"
 #include "lab/impedance/spectrum.hpp"
 #include "lab/stability/arm.hpp"
 #include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
 #include "tests/lab/lab_line.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/identified_device.hpp"
@@ -172,6 +179,100 @@ TEST_CASE("a frequency at which the limits of the force leave no motion has theo
   CHECK(has(impedance::json_of(spectrum), "\"measured\": null"));
 }
 
+namespace {
+
+/// Runs the wall of a scene whose hand shakes in it, slowly, then faster and faster, and records
+/// it.
+void record_chirp(const TemporaryFolder& folder, const std::string& name) {
+  std::string script =
+      "unit_mm = 1\nstart_mm = [0, 2, 0]\n[hand]\nstiffness_n_per_mm = 5\n"
+      "damping_ns_per_mm = 0.05\nmass_kg = 0\n"
+      "[[step]]\nmove_mm = [0, -0.9, 0]\nseconds = 0.5\n";
+  double seconds = 0.5;  // half a period
+  for (int i = 0; i < 150; ++i, seconds *= 0.965) {
+    script += format("[[step]]\nmove_mm = [0, %g, 0]\nseconds = %.4f\n", i % 2 == 0 ? -1.5 : -0.3,
+                     std::max(seconds, 0.002));
+  }
+  const std::string hand_file = folder.write("chirp.toml", script);
+  const Scene scene =
+      Scene::load(std::string(KERF_TEST_SCENES) + "/wall.toml",
+                  {"device.personality=\"omega\"", "servo.velocity={name=\"difference\", tau_ms=2}",
+                   "force.stiffness_n_per_mm=0.8", "force.damping_ns_per_mm=0.003",
+                   "limits.slew_n_per_ms=1.8"});
+  Servo servo(scene);
+  Hand hand(scene, hand_file);
+  LogWriter log((folder / name), scene);
+  for (int i = 0; i < 40'000 && !hand.ended(); ++i) log.add(servo.step(hand.next(servo.last())));
+  CHECK(hand.ended());
+  log.close();
+}
+
+}  // namespace
+
+TEST_CASE("the log of a hand that shakes in a wall has the impedance of the theory") {
+  const TemporaryFolder folder;
+  record_chirp(folder, "log");
+  const std::string json_file = folder / "z.json";
+  const LabAnswer answer = lab("impedance --log " + (folder / "log").string() +
+                               " --delay 2 --frequency 2:60:12 --json " + json_file);
+  CAPTURE(answer.out);
+  CHECK(answer.err.empty());
+  CHECK(answer.code == 0);
+  CHECK(has(answer.out,
+            "K 0.8 N/mm, B 0.003 N s/mm at 1000 Hz, delay 2 ms; law coupling, "
+            "estimator difference/tau_ms=2, stabiliser none"));
+  const Json rows = Json::parse(text_of(json_file)).at("rows");
+  int measured_rows = 0;
+  for (std::size_t i = 0; i < 12; ++i) {
+    const Json& wall = rows.at(i).at("wall");
+    const double hz = rows.at(i).at("hz").get<double>();
+    if (!wall.at("measured").contains("damping_ns_per_mm")) continue;
+    ++measured_rows;
+    const auto impedance_of = [&](const char* how) {
+      const Json& felt = wall.at(how);
+      return impedance::Impedance(
+          felt.at("damping_ns_per_mm").get<double>(),
+          -felt.at("stiffness_n_per_mm").get<double>() / (impedance::kTurn * hz));
+    };
+    const auto off = deviation(impedance_of("measured"), impedance_of("theory"));
+    CAPTURE(hz);
+    CHECK(std::abs(off.ratio) < 0.01);
+    CHECK(std::abs(off.deg) < 1);
+  }
+  CHECK(measured_rows >= 8);
+  for (const auto& [words, line] :
+       {std::pair{"--stiffness 1", "--stiffness: the recording has its own"},
+        std::pair{"--rate 500", "--rate: the scene of the recording has it"}}) {
+    const LabAnswer wrong = lab("impedance --log " + (folder / "log").string() + " " + words);
+    CAPTURE(wrong.err);
+    CHECK(wrong.code == 2);
+    CHECK(has(wrong.err, line));
+    CHECK(std::ranges::count(wrong.err, '\n') == 1);
+  }
+}
+
+TEST_CASE("a motion that does not explain the force shows no wall") {
+  impedance::LoggedWall wall;
+  const SampledLoop loop;
+  for (int tick = 0; tick < 4000; ++tick) {
+    wall.tip_mm.push_back(std::sin(impedance::kTurn * 20 * tick * loop.period_s));
+    wall.force_n.push_back(-2 * wall.tip_mm.back());
+  }
+  const auto row = impedance::logged_at(wall, loop, 20);
+  REQUIRE(row.wall);
+  CHECK(row.amplitude_mm == doctest::Approx(1).epsilon(0.01));
+  CHECK(std::abs(deviation(*row.wall, wall_impedance(loop, 2, 0, 20)).ratio) < 1e-3);
+  std::uint32_t noise = 1;  // Knuth's generator
+  for (double& force_n : wall.force_n) {
+    noise = noise * 1664525 + 1013904223;
+    force_n += noise / 4294967296.0;
+  }
+  CHECK_FALSE(impedance::logged_at(wall, loop, 200).wall.has_value());
+  wall.tip_mm.resize(400);
+  wall.force_n.resize(400);
+  CHECK_FALSE(impedance::logged_at(wall, loop, 20).wall.has_value());  // one segment
+}
+
 TEST_CASE("a wall that cannot be gets one line") {
   for (const auto& [words, line] :
        {std::pair{"--rate 500,1000", "--rate: 500,1000: one wall has one value; give one"},
@@ -181,6 +282,7 @@ TEST_CASE("a wall that cannot be gets one line") {
         std::pair{"--arm --delay 64", "--arm: delay 64 ms: an emulated device has whole steps"},
         std::pair{"--arm --rate 3000", "--rate: 3000 does not divide 8000"},
         std::pair{"--arm --quantum 0.1", "--quantum: device and servo have their own"},
+        std::pair{"--log nowhere", "--log: nowhere"},
         std::pair{"--law paper", "--law: paper is a force of the whole arm"},
         std::pair{"--filter 2", "--filter: foaw has no low-pass"},
         std::pair{"--direction z", "--direction: is that of a file"},

@@ -373,6 +373,18 @@ class TestIdentified(Case):
         worst = kerf.highest_stiffness(kerf.map_loop(self.file), 0.002)
         self.assertLessEqual(worst, min(kerf.highest_stiffness(kerf.map_loop(self.file, direction=axis), 0.002) for axis in "xyz"))
 
+    def test_its_wall_is_felt_as_in_the_lab(self):
+        out = self.home / "felt.json"
+        subprocess.run([BIN / "kerf-lab", "impedance", "--device", self.file, "--direction", "z", "--stiffness", "2", "--damping", "0.003",
+                        "--frequency", "3,30,100", "--json", out], check=True, capture_output=True)
+        rows = json.loads(out.read_text())["rows"]
+        felt = kerf.impedance(2, 0.003, self.file, direction="z", hz=[row["hz"] for row in rows])
+        for of, z in (("wall", felt.wall), ("port", felt.port)):
+            np.testing.assert_allclose(felt.stiffness_n_per_mm(z), [row[of]["theory"]["stiffness_n_per_mm"] for row in rows], rtol=1e-9)
+        np.testing.assert_allclose(felt.wall.real, [row["wall"]["theory"]["damping_ns_per_mm"] for row in rows], rtol=1e-9)
+        self.assertEqual(kerf.impedance(2, rate_hz=4000).hz[[0, -1]].tolist(), [1, 1000])
+        self.refused("hz, amplitude_mm", kerf.impedance, 2, hz=500)
+
     def test_a_scene_that_names_it_is_emulated_so_and_its_log_needs_no_file(self):
         device = {"identified": str(self.file)}
         self.same_as_programs("touch", device=device)
