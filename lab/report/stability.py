@@ -187,8 +187,9 @@ FELT = """
 At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is stiffer and less damped than the wall of the theory
 (docs/theory.md 5.8), because `foaw` lags behind the difference that the theory has. At the device's port it feels
 {port_k} N/mm and {port_b} N s/mm, since the mass counts against the spring. Where the damping is negative, the hand gets energy,
-unless it damps more than that itself. `--arm` measures the whole servo step with an emulated device, `--plot` draws the
-figures, `--estimator difference` has the theory's wall.
+unless it damps more than that itself. `--estimator difference` has the theory's wall, `--arm` measures the whole servo step
+with an emulated device, and `--log DIR` takes the wall from a recording ([log](log.md)) in which a hand shook within it, slowly
+and faster and faster, as a chirp does. `--plot` draws the figures.
 
 """
 

@@ -68,6 +68,13 @@ DeviceDirection take_device(const std::string& file, const std::string& directio
     throw HilError("--rate: " + texts[index_of(AxisId::rate)] + ": the delay of " + file +
                    " is a time, so the map has one rate; give one");
   }
+  const double periods = device.delay_s * *rate_hz;
+  if (texts[index_of(AxisId::delay)].empty() && periods > kMaxDelayPeriods) {
+    throw HilError(
+        format("--rate: at %g Hz the delay of %s is %.4g periods, and a loop has up to "
+               "%g; give a lower one",
+               *rate_hz, file.c_str(), periods, kMaxDelayPeriods));
+  }
   // The damping of a map is a range as a rule; the direction is then that at the standard one.
   const char* const standard = axis_kinds()[index_of(AxisId::damping)].standard;
   const auto damping = number_in(texts[index_of(AxisId::damping)]);
@@ -81,7 +88,7 @@ DeviceDirection take_device(const std::string& file, const std::string& directio
   fill(AxisId::viscous, found.viscous_ns_per_mm);
   fill(AxisId::friction, found.coulomb_n);
   fill(AxisId::quantum, found.quantum_mm);
-  fill(AxisId::delay, device.delay_s * *rate_hz);
+  fill(AxisId::delay, periods);
   return found;
 }
 

@@ -163,15 +163,19 @@ TEST_CASE("a file that is no device, and options against it, get one line") {
         (folder / "device.toml").string() + ": more than 1 MiB; use a shorter one");
 
   const std::string file = folder.write("device.toml", kDeviceFile);
+  const std::string late = folder.write("late.toml", device_file_with("= 0.0018", "= 0.0025"));
   for (const auto& [words, line] :
        {std::pair{"--direction z", "--direction: is that of a file"},
         std::pair{"--direction 0,0,0 --device FILE", "--direction: 0,0,0: no direction"},
         std::pair{"--direction up --device FILE", "--direction: up: no direction"},
         std::pair{"--arm --device FILE", "leave --arm out"},
         std::pair{"--rate 500,1000 --device FILE", "the map has one rate"},
+        std::pair{"--rate 32000 --device LATE",
+                  "late.toml is 80 periods, and a loop has up to 64; give a lower one"},
         std::pair{"--device omni,FILE", "one file alone"}}) {
     std::string text = words;
     if (const auto at = text.find("FILE"); at != std::string::npos) text.replace(at, 4, file);
+    if (const auto at = text.find("LATE"); at != std::string::npos) text.replace(at, 4, late);
     const LabAnswer answer = lab("zwidth --quick " + text);
     CAPTURE(answer.err);
     CHECK(answer.code == 2);
