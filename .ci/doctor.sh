@@ -133,7 +133,7 @@ throttle=$(cat /proc/sys/kernel/sched_rt_runtime_us 2>/dev/null || echo unknown)
 case $throttle in
   -1 | unknown) row ok 'rt throttling' "${throttle/-1/off}" ;;
   *) row ok 'rt throttling' "real-time threads may use $((throttle / 10000)) % of a core" \
-    'one that never sleeps stops all others of its core: docs/real-time.md, "50 ms in each second"' ;;
+    'one that never sleeps stops all others of its core: docs/first-hour.md, "50 ms in each second"' ;;
 esac
 
 # Devices, rights to them and real-time rights: the controller's own look around.

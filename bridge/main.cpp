@@ -38,13 +38,14 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
               "PEM file: lets in viewers alone whose certificate it signed")
       .shown_as("FILE");
   serve.option("--token-file", options.token_file,
-               "who may look, as often as they like: one token a line");
-  serve.option("--allow-commands", options.command_tokens, "who may command too: one token a line");
+               "tokens that may watch, any number of times: one a line");
+  serve.option("--allow-commands", options.command_tokens,
+               "tokens that may also command: one a line");
   serve.option("--max-viewers", options.max_viewers, "at once")
       .within(1, kMostViewers)
       .shows_default();
   serve.flag("--dedicated-link", options.dedicated_link,
-             "nobody else uses the link: fresher under loss, unfair to others");
+             "the link has no other users: fresher under loss, unfair to others");
   serve
       .option("--openigtlink", options.openigtlink,
               "port for 3D Slicer at the same host: send only, no token, no encryption")

@@ -214,7 +214,7 @@ def check(options):
     check_link(options)
     if options.mouse:
         if options.virtual:
-            raise Refusal("--hand mouse: nobody is as fast as --virtual; leave one of them out")
+            raise Refusal("--hand mouse: no user is as fast as --virtual; leave one of them out")
         if options.headless:
             raise Refusal("--hand mouse: --headless and --sheet have no window to point at; leave one of them out")
         if not has_display():

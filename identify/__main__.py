@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`./kerf identify`: mass, friction, delay, quantum and mode of a device, from a recording of its motion, or from a motion that it
-makes itself (docs/identify.md).
+makes itself (docs/gains.md).
 
     python3 identify FOLDER_OF_KERF FOLDER_OF_PROGRAMS --log DIR [--out FILE]
     python3 identify FOLDER_OF_KERF FOLDER_OF_PROGRAMS --scene SCENE [--device NAME] [--port PORT] [--log DIR] [--out FILE]

@@ -19,7 +19,7 @@ def _list(values):
 
 def text_of(found, period_s, origin):
     """The file. Keys of what the log does not have are left out."""
-    lines = [f"# A device, as kerf identify found it in {origin}: docs/identify.md.", "", "[device]"]
+    lines = [f"# A device, as kerf identify found it in {origin}: docs/gains.md.", "", "[device]"]
 
     def table(values, delay):
         parts = [("mass_kg", values[_MASS], 1.0, "xx, yy, zz, xy, xz, yz"), ("viscous_ns_per_mm", values[_VISCOUS], 1e-3, "x, y, z"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mass matrix, friction, delay, quantum and structural mode of a device from positions and forces of its ticks (docs/identify.md).
+"""Mass matrix, friction, delay, quantum and structural mode of a device from positions and forces of its ticks (docs/gains.md).
 
     M x'' + b x' + f sign(x') + k x + g = F(t - delay)      at the tip, per axis but for M, which is symmetric
 
@@ -50,7 +50,7 @@ class Motion:
 
 @dataclasses.dataclass
 class Estimate:
-    """values, low, high: by NAMES, SI units, delay in periods; NaN: not in the log. The rest: see docs/identify.md."""
+    """values, low, high: by NAMES, SI units, delay in periods; NaN: not in the log. The rest: see docs/gains.md."""
     values: np.ndarray
     low: np.ndarray
     high: np.ndarray

@@ -82,7 +82,7 @@ struct RecordSummary {
   std::uint64_t missed_before_start = 0;  ///< overwritten before the recorder started
   std::uint64_t contact_ticks = 0;
   std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
-  std::uint64_t stale_ticks = 0;  ///< since the device was taken in hand, before it had gone
+  std::uint64_t stale_ticks = 0;  ///< since the user picked up the device, before it had gone
   std::uint64_t faults = 0;       ///< changes of the fault code to a value that is not 0
   std::uint32_t missed_deadlines = 0;
   std::uint32_t lost_packets = 0;

@@ -83,7 +83,7 @@ std::string text_of_status(unsigned status, const std::string& answer) {
            "HOST:PORT";
   }
   if (status >= 500) {
-    return "has an error of its own (" + answer +
+    return "has an error (" + answer +
            "); systemctl restart haply-inverse-service, and see /var/log/haply-inverse-service";
   }
   return "does not take the request (" + answer + "); " + kNeeds;

@@ -66,7 +66,7 @@ std::string text_of(Bar bar) {
              "set basis "
              "XYZ and no mount in the vendor's Hub";
     case Bar::damped:
-      return "the service adds damping of its own; set it to 0 in the vendor's Hub";
+      return "the service adds damping; set it to 0 in the vendor's Hub";
   }
   return "";
 }

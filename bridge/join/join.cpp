@@ -149,7 +149,7 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
       if (!had_token) {
         throw Outdated("asks for a token; take all of the wss:// address it prints, in quotes");
       }
-      throw Outdated("the token is not one of its own; take the wss:// address it prints");
+      throw Outdated("it does not know the token; take the wss:// address it prints");
     case CloseCode::too_many:
       throw BridgeError("has as many viewers as it takes");
     case CloseCode::too_slow:

@@ -59,7 +59,7 @@ std::string text_of(const std::filesystem::path& file, const std::string& locati
     text.append(part.data(), static_cast<std::size_t>(std::max<ssize_t>(bytes, 0)));
   } while (bytes > 0 && text.size() <= kMostBytes);
   ::close(fd);
-  if (bytes < 0) throw BridgeError(location + "nobody writes into this pipe; name a file");
+  if (bytes < 0) throw BridgeError(location + "no program writes into this pipe; name a file");
   if (bytes > 0) throw BridgeError(location + "more than 1 MiB; write one token a line into it");
   return text;
 }

@@ -155,7 +155,7 @@ void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::st
   if (setup.tokens.may_command()) {
     std::cout << "with a token of --allow-commands in its place a viewer may command, too\n";
   }
-  std::cout << "for one browser; the next one gets an address of its own\n";
+  std::cout << "for one browser; the next one gets another address\n";
   print_pages(setup, port, page_token, qr);
 }
 

@@ -53,10 +53,10 @@ void agree(PacketPort& port, const std::string& location, const LinkHello& ours,
   }
   if (port.closed()) {
     throw std::runtime_error(location +
-                             ": the emulator closed the link; see what it says, and start it with "
+                             ": the emulator closed the link; read its message, and start it with "
                              "--stay where clients come one after another");
   }
-  throw std::runtime_error(location + ": nobody answers the hello of this controller within " +
+  throw std::runtime_error(location + ": no answer to the hello of this controller within " +
                            std::to_string(patience_ms / 1000) +
                            " s; end the client that the emulator serves, or start kerf-emulator "
                            "of this version");

@@ -146,7 +146,7 @@ void refuse_steps(Denoise passes, const VolumeImage& image) {
   const std::size_t levels = levels_of(image.density);
   if (levels >= kLeastLevels) return;
   throw LoadError(begin + " for a file of " + std::to_string(levels) +
-                  " levels; noise can be told from " + std::to_string(kLeastLevels) +
+                  " levels; noise can be distinguished from " + std::to_string(kLeastLevels) +
                   " on, leave it out");
 }
 

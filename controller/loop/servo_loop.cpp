@@ -300,7 +300,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, AnyServo& servo,
 
 std::jthread start_watchdog(Watchdog& watchdog, const RealTimeOptions& servo) {
   return std::jthread([&watchdog, above = io_thread_of(servo)](const std::stop_token& stop) {
-    // Linux keeps a part of each core for ordinary threads (docs/real-time.md): if another program
+    // Linux keeps a part of each core for ordinary threads (docs/first-hour.md): if another program
     // uses up the rest, all real-time threads of that core stop together.
     static_cast<void>(avoid_core(above.core));
     static_cast<void>(set_fifo(above.priority));

@@ -52,7 +52,7 @@ inline constexpr std::size_t kMostForbidden = 64;
 
 /// Statistics of one arm, from its own arming on.
 struct ArmRecord {
-  bool in_use = false;  ///< was armed and taken in hand
+  bool in_use = false;  ///< was armed and picked up
   std::uint64_t stale_ticks = 0;
   std::uint64_t contact_ticks = 0;
   std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched

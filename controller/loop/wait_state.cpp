@@ -79,7 +79,7 @@ Waiting waiting_for(const DeviceReport& report, const ServoOutput& output) noexc
 }
 
 const char* action_for(Personality personality, Waiting waiting) noexcept {
-  if (waiting == Waiting::gone) return "connect it again; the other one goes on";
+  if (waiting == Waiting::gone) return "connect it again; the other one continues";
   return row_of(kDeeds, personality).of_waiting[static_cast<std::size_t>(waiting)];
 }
 

@@ -17,7 +17,7 @@ struct ControllerOptions {
   SceneOverrides overrides;
   std::vector<std::string> ports;  ///< as in open_port.hpp, one for each device of the scene
   std::optional<double> seconds;   ///< servo time after arming; none: until stopped
-  double wait_s = 60;              ///< servo time for the device to be taken in hand
+  double wait_s = 60;              ///< servo time until the user picks up the device
   std::string name = kDefaultName;
   bool virtual_time = false;
   std::vector<std::string> until;  ///< FIFOs with the tick up to which lock-step may go

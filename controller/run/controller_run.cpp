@@ -234,7 +234,7 @@ const char* text_of(EndReason end) {
     case EndReason::never_armed:
       break;
   }
-  return "the device was never taken in hand";
+  return "the user never picked up the device";
 }
 
 /// Density that was taken away, over full density.
@@ -331,7 +331,7 @@ void explain_faults(const EventList& faults, const std::string& port, const std:
               "went off; if no fault script held them back, its machine is too busy for real time: "
               "end what else runs on it, or run in lock-step (--virtual)"
             : ": reports came more than 5 ms apart again and again, and the motors went off; see "
-              "to the cable, and to what else this machine does (docs/real-time.md)"}}};
+              "to the cable, and to what else this machine does (docs/first-hour.md)"}}};
   for (const auto& [fault, way_out] : why) {
     const auto first = std::ranges::find(
         faults.kept(), std::string_view(fault_name(fault)),
@@ -349,7 +349,7 @@ void tell_of_forces(const ExternalPage& external, double stale_ms) {
   if (external.refused() > 0) {
     log_warning(std::to_string(external.refused()) + " of " + std::to_string(external.taken()) +
                 " forces of the program were refused: a number was not finite or out of bounds, or "
-                "stiffness or damping were below 0 or above the scene's; see docs/external.md");
+                "stiffness or damping were below 0 or above the scene's; see docs/own-law.md");
   }
   if (external.gaps() > 1) {
     log_warning("the program's force became stale " + std::to_string(external.gaps()) +

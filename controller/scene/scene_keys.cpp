@@ -162,7 +162,7 @@ constexpr SceneCondition kNoMesh{
 // clang-format off
 constexpr SceneKey kKeys[] = {
     {"scene.title", "", at<&SceneSettings::title>, {},
-     "what it shows, in a few words; readers of the segment are told"},
+     "a short description, which readers of the segment get"},
 
     {"volume.name", "", at<&VolumeSpec::name>, {},
      "tells it from others in pictures and reports", {}, {.default_text = "the file's"}},
@@ -280,11 +280,11 @@ constexpr SceneKey kKeys[] = {
      "name of the tool that it holds at the start; a command changes it",
      {}, {.default_text = "the first; of a second device the second", .json = InJson::if_changed}},
     {"device.identified", "", at<&DeviceSettings::identified>, {},
-     "a device.toml of kerf identify, from the scene's folder: its mass, friction and delay in checks of gains and in the emulator (docs/identify.md)",
+     "a device.toml of kerf identify, from the scene's folder: its mass, friction and delay in checks of gains and in the emulator (docs/gains.md)",
      {}, {.default_text = "none", .json = InJson::never}},
 
     {"force.model", "", at<&ForceSettings::model>, one_of(kForceModelWords),
-     "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients; external: a program gives it, and needs no volume and no tool (docs/external.md)"},
+     "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients; external: a program gives it, and needs no volume and no tool (docs/own-law.md)"},
     {"force.p0_n_per_mm2", "N/mm^2", at<&ForceSettings::p0_n_per_mm2>, between(0, 1000),
      "force per mm^2 of surface", kPaper},
     {"force.stiffness_n_per_mm", "N/mm", at<&ForceSettings::stiffness_n_per_mm>,
@@ -312,7 +312,7 @@ constexpr SceneKey kKeys[] = {
      "preston: the force cuts; overlap: what is covered goes at a rate; overlap_exact: the same at any rate",
      {}, {.default_text = "\"preston\"; with the paper's force \"overlap\", with an external one \"none\""}},
     {"cut.pedal", "", at<&CutSettings::pedal>, one_of(kCutPedalWords),
-     "always: whatever is pressed cuts; button: only while the device's first button is pressed; auto: button with --pedal, as with a hand that a window leads, else always",
+     "always: every press cuts; button: only while the device's first button is pressed; auto: button with --pedal, as with a hand that a window leads, else always",
      {}, {.json = InJson::if_changed}},
     {"cut.rate_per_s", "1/s", at<&CutSettings::rate_per_s>, between(0, 100000, kCutRateWords),
      "share of what is covered that goes; 1/T: all of it in each tick, as in the paper",
@@ -373,7 +373,7 @@ constexpr SceneTableRow kTables[] = {
     {"material", kMaxMaterials, "What a label of a volume stands for."},
     {"device", 0,
      "What is held, and where it is in the scene. Written twice, as [[device]], it is two arms, "
-     "each with a tool of its own, in the same volumes (docs/devices.md)."},
+     "each with its own tool, in the same volumes (docs/devices.md)."},
     {"force", 0, "How a touch becomes a force."},
     {"cut", 0, "How material leaves (docs/cutting.md)."},
     {"spindle", 0, "What turns the tool where force cuts; an air turbine."},

@@ -10,7 +10,7 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
-// The force of a program in place of contact (force.model = "external", docs/external.md).
+// The force of a program in place of contact (force.model = "external", docs/own-law.md).
 
 namespace kerf {
 

@@ -38,11 +38,11 @@ struct ServoOutput {
   bool motors_on = false;
   Phase phase = Phase::off;
   Fault fault = Fault::none;
-  bool started = false;    ///< was armed and taken in hand at least once: ticks count
-  bool stale = false;      ///< no fresh report in this tick
-  bool clamped = false;    ///< force, slew, thermal or motor limit was active
-  bool contact = false;    ///< commanded force above 0.01 N
-  bool forbidden = false;  ///< the tool presses on a forbidden material
+  bool started = false;                   ///< was armed and picked up at least once: ticks count
+  bool stale = false;                     ///< no fresh report in this tick
+  bool clamped = false;                   ///< force, slew, thermal or motor limit was active
+  bool contact = false;                   ///< commanded force above 0.01 N
+  bool forbidden = false;                 ///< the tool presses on a forbidden material
   std::uint64_t forbidden_materials = 0;  ///< which: bit m is material m of the scene
   bool refused = false;                   ///< no free position near the hand: no force
   bool shaft = false;                     ///< load of shaft and handpiece above 0.01 N

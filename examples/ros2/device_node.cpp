@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A haptic device of a running controller (docs/external.md) as topics of ROS 2, by the names of
+// A haptic device of a running controller (docs/own-law.md) as topics of ROS 2, by the names of
 // CRTK: measured_cp, measured_cv, measured_cf out, servo_cf in; of two arms arm1/... and arm2/...
 // It needs kerf/external.h alone.
 //

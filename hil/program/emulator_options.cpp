@@ -243,7 +243,7 @@ void declare(Arguments& app, EmulatorOptions& o) {
              "which device to be: omni, falcon, woodenhaptics, inverse3, touch, omega")
       .shows_default();
   app.flag("--describe", o.describe,
-           "print what a host has to be told of this unit (torque_scale), and end");
+           "print the settings that a host needs for this unit (torque_scale), and end");
   app.option("--hand", o.hand, "hand script (TOML); none: the arm stays in its rest pose");
   app.option("--hand-socket", o.hand_socket,
              "path of a socket at which a window (kerf-visualizer --hand-socket) leads the hand, "

@@ -26,7 +26,7 @@ struct DeviceState {
 };
 
 /// A haptic device for a force of your own, under kerf's limits: the page of memory that a
-/// controller shares if its scene has `force.model = "external"` (docs/external.md; in C:
+/// controller shares if its scene has `force.model = "external"` (docs/own-law.md; in C:
 /// kerf/external.h). kerf arms the device, fades the force in, limits it, goes on with it while
 /// this program is late, fades it out if the program is gone, and switches the motors off however
 /// the run ends.

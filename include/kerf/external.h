@@ -2,7 +2,7 @@
  *
  * A force of your own under kerf's limits, in C: the page of memory that a controller of a scene
  * with `force.model = "external"` shares with one program. You write what you ask for, kerf does
- * the rest: arming, fading, limits, watchdog, motors off (docs/external.md). Linux, GCC or Clang,
+ * the rest: arming, fading, limits, watchdog, motors off (docs/own-law.md). Linux, GCC or Clang,
  * with -std=gnu99 or later, or -D_GNU_SOURCE.
  *
  *     kerf_external arm;

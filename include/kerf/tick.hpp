@@ -64,7 +64,7 @@ struct ServoCommand {
 /// What a program asks of the hand in a scene with `force.model = "external"`: force plus
 /// stiffness (goal - tip) / workspace_scale - damping v, at the device port, along the axes of the
 /// scene. All limits of the scene apply to it. It counts for `force.stale_ms`; without a new one it
-/// fades to zero, and fades in again with the next (docs/external.md). One that is not finite or
+/// fades to zero, and fades in again with the next (docs/own-law.md). One that is not finite or
 /// beyond the bounds below is refused.
 struct ProgramForce {
   std::array<double, 3> force_n{};  ///< each component at most 255 N
@@ -79,7 +79,7 @@ enum class Phase : std::uint8_t {
   off,          ///< no report has come yet
   calibrating,  ///< never parked at rest yet, or homing lost: the joint angles are unknown
   armed,        ///< calibrated and parked: waits for the hand
-  ramping,      ///< taken in hand: force fades in
+  ramping,      ///< picked up: force fades in
   active,
   fault  ///< latched; parking at rest clears it
 };
@@ -189,7 +189,7 @@ inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;   ///< no fresh report
 inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;  ///< a fault of any kind is latched
 inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;
 inline constexpr std::uint32_t kFlagParked = 1U << 8;      ///< as the device reports
-inline constexpr std::uint32_t kFlagStarted = 1U << 9;     ///< taken in hand at least once
+inline constexpr std::uint32_t kFlagStarted = 1U << 9;     ///< picked up at least once
 inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< presses on a forbidden material
 inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< no free position near the hand
 inline constexpr std::uint32_t kFlagShaft = 1U << 12;  ///< shaft or handpiece presses on the solid

@@ -36,52 +36,58 @@ The Z-width of a device is the range of stiffness K that it can render, from fre
 sampled wall adds a little energy in every tick; damping of device, wall and hand removes it. Above some K more is added
 than removed, and the tip oscillates.
 
-Each cell of a map is a device at a flat wall, without a hand unless stated, that a *press* meets: a push (above
-friction), a speed and a distance at which the tip starts. Each stiffness gets 0.5 N from 0.1 mm at 0, 50 and 200 mm/s,
-and two presses of a sequence that fills all pushes from 0.05 N to 0.9 of the peak force, speeds up to 500 mm/s and
-distances up to 2 mm evenly from one stiffness to the next. All are repeated for each seed, and a cell has the worst
-verdict of all. `--push`, `--hit` and `--start` set one of the three, or a list of it as an axis.
+Each cell of a map is a simulated device at a flat wall, without a hand unless stated. A *press* is one run of it: the tip
+starts at a distance from the wall with a speed, and a constant force above friction pushes it on. Each stiffness gets three
+standard presses (0.5 N from 0.1 mm at 0, 50 and 200 mm/s) and two presses of a sequence. From one stiffness to the next the
+sequence fills evenly all pushes from 0.05 N to 0.9 of the peak force, speeds up to 500 mm/s and distances up to 2 mm. All
+presses are repeated for each seed, and a cell has the worst verdict of all. `--push`, `--hit` and `--start` set one of the
+three, or a list of it as an axis.
 
-* A cell *rests* if each run is proven to: friction holds the tip under a constant force for longer than the loop
-  remembers; or in the last half of the run the travel is at most one encoder step, and the energy given at most that of
-  a push over it. A loop without encoder steps counts as at rest within 0.0001 mm.
-* A cell *swings* if in both halves of the last half of a run the tip reverses at least twice, each time after more than
-  one encoder step, and its travel does not fall in all of eight windows. A creep does not reverse, so it is no swing.
-* A cell is *active* if in both halves of the last half the motors give more energy than a push over one encoder step
-  takes.
-* A cell is *arithmetic* if only rounding of fixed numbers keeps a motion up: the loop has no encoder steps, the travel
-  is below 1 µm, and the same runs rest in double. It counts as stable.
-* Any other cell is *undecided*.
-* A run ends when its rest is proven, else after 60 s, and later if mass and damping make its motion slower than that. A
-  swing with friction and encoder steps is chaotic: one run in a hundred stops only after 3 to 45 s. `--seconds` makes
-  the limit longer, never shorter, so that no verdict depends on it.
-* *First* is the lowest K of a column at which a run of any seed swings or is active: searched upwards in steps of 1 %,
-  then down by presses beside the one that was bad, as long as one of them is bad 2 % lower, then halved to 0.5 %; of the
-  whole arm in the steps of the map, halved to 0.5 %. Cells above it are tried with that press, too. The picture has a
-  bar from the lowest to the highest first swing of a single seed. Stable cells above are reported apart, because a hand
-  cannot reach them.
-* With friction the worst push is about half of the peak: there an oscillation has the most room between no force and the
-  peak, and the larger it is, the less of it friction takes (docs/theory.md 5.7).
+The verdicts, by the names of their columns:
+
+* *rests* (settles): proven for each run. Either friction holds the tip under a constant force for longer than the memory of
+  the loop, or in the last half of the run the travel is at most one encoder step and the motors give at most the energy of
+  a push over it. A loop without encoder steps settles if the travel is at most 0.0001 mm.
+* *swings* (oscillates): in both halves of the last half of a run the tip reverses at least twice, each time after more than
+  one encoder step, and its travel does not fall over all of eight windows. A creeping tip does not reverse, so it does not
+  count as oscillating.
+* *active*: in both halves of the last half the motors give more energy than a push over one encoder step takes.
+* *arithmetic*: only the rounding of fixed-point numbers keeps up a motion. The loop has no encoder steps, the travel is below
+  1 µm, and the same runs settle in double. It counts as stable.
+* *undecided*: any other cell.
+
+How a map is searched:
+
+* A run ends when it is proven to have settled, else after 60 s, and later if mass and damping make its motion slower than that.
+  An oscillation with friction and encoder steps is chaotic: one run in a hundred stops only after 3 to 45 s. `--seconds`
+  makes the limit longer, never shorter, so no verdict depends on it.
+* *First* is the lowest K of a column at which a run of any seed oscillates or is active. The search goes upwards in steps of
+  1 %. Then it goes down with presses near the bad one, as long as one of them is bad 2 % lower, and ends by halving to 0.5 %.
+  For the whole arm it uses the steps of the map, halved to 0.5 %. Cells above *first* are tried with the bad press, too. The
+  picture has a bar from the lowest to the highest *first* of a single seed. Stable cells above are reported separately,
+  because a hand cannot reach them.
+* With friction the worst push is about half of the peak: the oscillation then has the most room between no force and the
+  peak, and friction takes the smallest part of a large oscillation (docs/theory.md 5.7).
 * There is no thermal limit: weaker motors would end an oscillation.
 
-A seed sets the phase of the encoder steps relative to the wall, which at one press is worth up to a factor of two in K,
-and where the sequence of presses begins. It is equal in every column, so that two columns differ by their axes alone.
-`--seed` is the first seed, `--seeds` their number, 5 unless given.
+A seed sets the phase of the encoder steps relative to the wall, which changes K by up to a factor of two for one press. It
+also sets the start of the sequence of presses. Seeds are the same in every column, so that two columns differ by their axes
+alone. `--seed` is the first seed, `--seeds` their number, 5 unless given.
 
 *One axis* runs the servo's own coupling, velocity estimator, stabilisers and force limits, as the same templates and in
 the loop's numbers, with exact mechanics. *Whole arm* (`--arm`) runs the servo step with the emulated device, its driver
 and its packets in virtual time; it also slides onto the flat and hits the corner of three walls, and has one press of
-the sequence at each stiffness. The mechanics are plausible values, not those of a unit: for your device, give `--mass`,
-`--viscous`, `--friction` and `--quantum`.
+the sequence at each stiffness. The mechanics are plausible values, not those of a unit. For your device, give `--mass`,
+`--viscous`, `--friction` and `--quantum`, or the file of `./kerf identify` ([gains](gains.md#identify-your-device)).
 
 """
 
 DEVICES = """\
-The lowest K in N/mm that swings or is active, at two dampings B: the default, and the one with the highest K on the
+The lowest K in N/mm that oscillates or is active, at two dampings B: the default, and the one with the highest K on the
 device's map.
 
 * *Linear, exact* is the boundary of another loop: a linear two-sided wall with the backward difference, in double,
-  without friction, encoder steps and limits. A picture draws it in black for that loop alone, dotted beside others.
+  without friction, encoder steps and limits. A picture draws it solid for that loop alone, dotted beside others.
 * The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
 * Each measured K is the lowest of five seeds; undecided counts as unstable. The whole arm has 14 stiffnesses.
 * *Safe K, emulated* is the minimum of the row over 1.5, for the emulated device alone. The margin covers phases and islands between two
@@ -101,10 +107,10 @@ STABILISERS = """
 ## Stabilisers
 
 The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed.
-Their worst press is another one: a light push alone (`--push 0.5`) is helped far more than a hard one.
-docs/energy.md has the effect on the hand. `passivity` books a force in the tick that commands it. With a delay the force
-acts later, and the port may give far more energy than is booked: `port_minimum_mj` of `--csv` has the lowest energy of the
-port in each cell. A run that swings and is active ends its cell.
+A stabiliser helps against a light push alone (`--push 0.5`) far more than against a hard one.
+docs/energy.md has the effect on the hand. `passivity` accounts for a force in the tick that commands it. With a delay the force
+acts later, and the port may give far more energy than the account shows: `port_minimum_mj` of `--csv` has the lowest energy of the
+port in each cell. A run that oscillates and is active ends its cell.
 
 """
 
@@ -125,9 +131,9 @@ the first crossing. Five seeds, 40 stiffnesses from 0.05 to 50 N/mm.
 """
 
 NUMBERS = """
-They differ where a run is chaotic, which is near every boundary of a loop with friction and encoder steps: a difference
-of 2^-16 mm or N moves an encoder step to another tick, and with it the rest position of the tip. No number type is better
-in general.
+They differ if a run is chaotic, as near every boundary of a loop with friction and encoder steps: a difference of 2^-16 mm
+or N moves an encoder step to another tick, and with it the rest position of the tip. Neither number type is better in
+general.
 
 """
 
@@ -141,7 +147,7 @@ no rows.
 |---|---|---|
 | loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits, push_n, hit_mm_per_s, start_mm | in the name | value of each axis, given or standard; `any` of a press: searched |
 | stiffness_n_per_mm | N/mm | K of the cell |
-| swings, active, undecided, arithmetic | 0 or 1 | a run shows it; a cell with four zeros is proven to rest |
+| swings, active, undecided, arithmetic | 0 or 1 | verdict of the worst run; a cell with four zeros is proven to settle |
 | travel_mm | mm | peak to peak in the last half of a run, the largest of all runs; 0: held by friction |
 | given_mj | mJ | energy that the motors gave in that half |
 | port_minimum_mj | mJ | lowest energy of the device port in a run that begins at 0 |
@@ -205,7 +211,7 @@ HOW = """\
     ./kerf lab zwidth --map push,stiffness --push 0.1:2.9:15 --damping 0.002 --plot p.svg # what is stable for a light push alone
     ./kerf lab zwidth --seeds 200 --damping 0.002 --map delay,stiffness --delay 0,1,2 --json band.json # K of each seed
 
-`--law`, `--estimator` and `--stabiliser` also take the laws that a program of yours registers (docs/own-law.md).
+`--law`, `--estimator` and `--stabiliser` also take the laws that your own program registers (docs/own-law.md).
 
 A map larger than one machine is cut into shards. Each keeps its finished columns in a part file and goes on from there
 when it is started again; `--merge` refuses parts of other seeds, programs or axes, and names what is missing. With GNU
@@ -433,7 +439,7 @@ def page(data, devices, rates):
                          [[row["device"], row["delay"], *(" / ".join(map(first, row["lowest"][kind])) for kind in kinds)]
                           for row in data["stabilisers"]])
             + f"\n## Rates\n\n![Maps of six rates]({rates})\n\n" + RATES + KNOBS
-            + text.table(["knob", ">value", ">swings from", ">active from", ">linear, exact", ">re-entry"],
+            + text.table(["parameter", ">value", ">swings from", ">active from", ">linear, exact", ">re-entry"],
                          [[", ".join(filter(None, (row["name"], row["unit"]))),
                            f"**{row['value']}**" if row["standard"] else row["value"], first(row["swings"]),
                            first(row["active"]), text.figure(row["exact"]),

@@ -15,7 +15,7 @@ namespace kerf::faults {
 /// balls of radius 1.
 inline constexpr double kFloorMm = 1;
 
-/// What a program that gives the force of an external scene does (docs/external.md).
+/// What a program that gives the force of an external scene does (docs/own-law.md).
 enum class ProgramWay : std::uint8_t {
   steady,      ///< renders a floor by a goal, at 200 Hz
   stops,       ///< gives nothing for 300 ms, and goes on

@@ -238,7 +238,7 @@ const std::string& this_program() {
     if (bytes.empty()) {
       throw HilError(
           "/proc/self/exe: cannot be read, so a part would not tell which program made "
-          "it; let who runs this program read it");
+          "it; let the user of this program read it");
     }
     return hex64(fnv1a(bytes));
   }();

@@ -30,6 +30,6 @@ VOLUME = np.dtype([
 
 CLOCK = np.dtype([("monotonic_ns", "<i8"), ("utc_ns", "<i8"), ("within_ns", "<u4"), ("crc32c", "<u4")])  # of clock.npy
 
-STARTED = 1 << 9  # of `flags`: taken in hand at least once
+STARTED = 1 << 9  # of `flags`: picked up at least once
 FINAL = 3         # the first `lifecycle` that ends a run
 BRICK = 8         # voxels along its edge

@@ -85,7 +85,7 @@ void define_device(py::module_& module) {
   py::class_<OpenDevice>(module, "Device",
                          "A device for a force of your own, under kerf's limits: of the controller "
                          "that runs under `name`, with a scene of\n"
-                         "force.model = \"external\" (docs/external.md). Raises kerf.Error: there "
+                         "force.model = \"external\" (docs/own-law.md). Raises kerf.Error: there "
                          "is none, or another program has it.\n\n"
                          "    with kerf.Device(\"mine\") as device:\n"
                          "        for state in device:                      # each tick, or the "

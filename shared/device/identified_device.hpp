@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-// A device as `kerf identify` found it (docs/identify.md): what a file device.toml has, for maps,
+// A device as `kerf identify` found it (docs/gains.md): what a file device.toml has, for maps,
 // scenes and the emulator.
 
 namespace kerf {

@@ -120,7 +120,7 @@ int open_stream(const fs::path& path) noexcept {
 std::string not_written(int error) {
   if (error == ELOOP) return "is a link; name a file itself";
   if (error == EPIPE) return "its reader left before the end; let it read on";
-  if (error == ENXIO) return "nobody reads this pipe; start the reader first";
+  if (error == ENXIO) return "no program reads this pipe; start the reader first";
   return "cannot be written (" + std::generic_category().message(error) + "); " +
          remedy_for(error, "make room or choose another place");
 }
@@ -355,8 +355,7 @@ void check_distinct(const std::vector<OutputFile>& outputs) {
       if (&other == &output) break;
       if (other.path.empty() || !is_same_file(output.path, other.path)) continue;
       throw FileError(std::string(output.option) + " " + output.path.string() + ": " +
-                      std::string(other.option) +
-                      " writes there, too; give each a file of its own");
+                      std::string(other.option) + " writes there, too; give each its own file");
     }
   }
 }

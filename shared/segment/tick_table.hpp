@@ -63,7 +63,7 @@ inline constexpr TickCode kTickFlags[] = {
     {kFlagDeviceFault, "fault", "a fault is latched: the column fault says which"},
     {kFlagMotorsOn, "motors on", ""},
     {kFlagParked, "parked", "the device says that the hand is not at work"},
-    {kFlagStarted, "started", "taken in hand at least once: reports count from here"},
+    {kFlagStarted, "started", "picked up at least once: reports count from here"},
     {kFlagForbidden, "forbidden", "pressed on what may not be cut"},
     {kFlagRefused, "refused", "the tool finds no free place, and feels nothing"},
     {kFlagShaft, "shaft", "pressed with shaft or handpiece"},
@@ -93,7 +93,7 @@ inline constexpr TickCode kTickPhases[] = {
     {0, "off", "no report has come yet"},
     {1, "calibrating", "never docked yet, or homing lost: positions are unknown"},
     {2, "armed", "docked, waits for the hand"},
-    {3, "ramping", "taken in hand: the force fades in"},
+    {3, "ramping", "picked up: the force fades in"},
     {4, "active", "the motors follow"},
     {5, "fault", "no force until parked at rest"},
 };

@@ -441,7 +441,7 @@ TEST_CASE("arm: a killed adapter is a lost device to a running controller") {
   CAPTURE(controller.output());
   CHECK(controller.wait() == 1);
   const auto report = kerf::Json::parse(text_of(bench.folder / "run.json"));
-  CHECK(report.at("ticks").get<int>() > 0);  // it was taken in hand
+  CHECK(report.at("ticks").get<int>() > 0);  // it was picked up
   REQUIRE(report.at("fault_count").get<int>() > 0);
   CHECK(report.at("faults").at(std::size_t{0}).at("name").get<std::string>() == "stale_input");
   CHECK(report.at("lost_packets").get<int>() == 0);

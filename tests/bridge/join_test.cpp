@@ -96,7 +96,7 @@ TEST_CASE("join tells at once what keeps it from a picture, and gives up where i
   CHECK(first_words(with("")) ==
         place + ": asks for a token; take all of the wss:// address it prints, in quotes");
   CHECK(first_words(with("/?token=wrong-0123456789")) ==
-        place + ": the token is not one of its own; take the wss:// address it prints");
+        place + ": it does not know the token; take the wss:// address it prints");
   JoinOptions patient = with("/?token=" + kLook);
   patient.wait_s = 0.1;
   CHECK(last_words(patient).ends_with("; gave up after 0.1 s (--wait)"));
@@ -154,7 +154,7 @@ TEST_CASE("a token that a restarted bridge does not know ends the join, also aft
     end = error.what();
   }
   CHECK(restarted);
-  CHECK(end == place + ": the token is not one of its own; take the wss:// address it prints");
+  CHECK(end == place + ": it does not know the token; take the wss:// address it prints");
 }
 
 TEST_CASE("a view that is presented on one machine is presented on the other, in both directions") {

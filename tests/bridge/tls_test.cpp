@@ -188,7 +188,7 @@ TEST_CASE("join verifies the server's certificate: its CA, host, time or fingerp
   Attempt attempt(server_tls(lab));
   attempt.options.ca = ca;
   attempt.address("wss://", "look-0123456789abcdeF");
-  CHECK(attempt.ends() == "the token is not one of its own; take the wss:// address it prints");
+  CHECK(attempt.ends() == "it does not know the token; take the wss:// address it prints");
   attempt.address("ws://", kLook);
   CHECK(attempt.ends() == "takes no unencrypted viewers; take wss://");
 }
@@ -213,7 +213,7 @@ TEST_CASE("with --client-ca a viewer needs a certificate of that CA, and its tok
   attempt.options.key = lab / "viewer-key.pem";
   CHECK(attempt.ends() == "joined");
   attempt.address("wss://", "look-0123456789abcdeF");
-  CHECK(attempt.ends() == "the token is not one of its own; take the wss:// address it prints");
+  CHECK(attempt.ends() == "it does not know the token; take the wss:// address it prints");
   attempt.options.certificate = lab / "old.pem";
   CHECK(has(attempt.ends(), "the certificate ended on"));
 }

@@ -62,7 +62,7 @@ NOT_HERE = {
         "./kerf controller$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
         "./kerf controller --rate HZ$", "./kerf controller --port udp:HOST:5000$", "./kerf controller --report FILE$",
         "./kerf controller --explain --report FILE$", "./kerf record info LOG", "./kerf replay$", "./kerf identify$"],
-    "needs a recording of a device that a program has moved; the tests identify and lab run it": ["identify.md: "],
+    "needs a recording of a device that a program has moved; the tests identify and lab run it": ["./kerf identify", "./kerf lab zwidth --device device.toml", "./kerf controller --scene scenes/touch.toml --set 'device.identified"],
     "runs a program of the reader's own": ["./kerf stand-in --device touch --vendor-name Left"],
 }
 # What stands for a reader's own file, within text.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A program of C, of which kerf has a header alone, gives the force of a controller with an emulated device: it is rendered, held
-and faded as docs/external.md says, whatever becomes of the program, and the log replays to the bit.
+and faded as docs/own-law.md says, whatever becomes of the program, and the log replays to the bit.
 
     external_run_test.py ROOT BIN CC"""
 import os

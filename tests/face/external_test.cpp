@@ -26,7 +26,7 @@ kerf::Scene external(const kerf::Settings& settings = {}) {
   return kerf::Scene::load(kScenes + "/external.toml", settings);
 }
 
-/// A servo with its hand, taken in hand and beyond the fade after arming.
+/// A servo with its hand, picked up and beyond the fade after arming.
 struct Loop {
   explicit Loop(const kerf::Scene& scene) : servo(scene), hand(scene) {
     while (servo.last().phase != static_cast<std::uint16_t>(kerf::Phase::active)) step();

@@ -3,7 +3,7 @@
 
     python3 tests/identify/study.py FOLDER_OF_SOURCES LIBRARY [FIRST:LAST [SEED]]
 
-The library is tests/identify/arm.cpp. Prints each arm and the summary, which is that of docs/identify.md."""
+The library is tests/identify/arm.cpp. Prints each arm and the summary, which is that of docs/gains.md."""
 import sys
 
 import numpy as np

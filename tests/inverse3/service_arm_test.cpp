@@ -245,8 +245,8 @@ TEST_CASE("each status of an answer has the remedy of its own") {
         Case{"407 Proxy Authentication Required", "asks for a login (HTTP 407: in use)"},
         Case{"404 Not Found", "has no such address (HTTP 404: in use); needs the vendor's"},
         Case{"302 Found", "sends elsewhere (HTTP 302: in use), so another program answers there"},
-        Case{"500 Internal Server Error", "has an error of its own (HTTP 500: in use); systemctl"},
-        Case{"502 Bad Gateway", "has an error of its own (HTTP 502: in use); systemctl"},
+        Case{"500 Internal Server Error", "has an error (HTTP 500: in use); systemctl"},
+        Case{"502 Bad Gateway", "has an error (HTTP 502: in use); systemctl"},
         Case{"400 Bad Request", "does not take the request (HTTP 400: in use); needs the"}}) {
     CAPTURE(status);
     const std::string body = R"({"ok":false,"error":"in use"})";

@@ -48,7 +48,7 @@ TEST_CASE("two outputs that are one file are refused before anything is measured
   CHECK(answer.code == 2);
   CHECK(answer.out.empty());
   CHECK(answer.err ==
-        "kerf-lab: --csv " + file + ": --report writes there, too; give each a file of its own\n");
+        "kerf-lab: --csv " + file + ": --report writes there, too; give each its own file\n");
   CHECK(lab("accuracy --page " + file + ".svg").code == 2);
   CHECK(lab("bench --page " + file + " --report " + file).code == 2);
   for (const char* option : {"--csv", "--report", "--page", "--plot"}) {

@@ -152,10 +152,9 @@ TEST_CASE("denoise of labels and of few levels is refused in one line; auto leav
     return test::error_of([&] { static_cast<void>(load_scene(scene_of(folder, values, lines))); });
   };
   const std::string few = error(coarse, "denoise = 2\n");
-  CHECK(
-      few.find(
-          "scene.toml:2: denoise: 2 for a file of 8 levels; noise can be told from 16 on, leave it "
-          "out") != std::string::npos);
+  CHECK(few.find("scene.toml:2: denoise: 2 for a file of 8 levels; noise can be distinguished from "
+                 "16 on, leave it "
+                 "out") != std::string::npos);
   CHECK(few.find('\n') == std::string::npos);
   const std::string map = error(labels, "denoise = 1\n");
   CHECK(

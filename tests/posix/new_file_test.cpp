@@ -143,7 +143,7 @@ TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
   const fs::path pipe = folder / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
   CHECK(refusal_of([&] { write_new_file(pipe, "{}"); }) ==
-        pipe.string() + ": nobody reads this pipe; start the reader first");
+        pipe.string() + ": no program reads this pipe; start the reader first");
   const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   REQUIRE(reader >= 0);
   kerf::check_new_file(pipe);

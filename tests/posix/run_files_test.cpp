@@ -82,7 +82,7 @@ TEST_CASE("two outputs of a run are two files") {
   const TemporaryFolder folder;
   const fs::path one = folder / "one";
   CHECK(has(refusal({}, {{"--sheet", one, ".png"}, {"--report", folder / "./one", ".json"}}),
-            "--sheet writes there, too; give each a file of its own"));
+            "--sheet writes there, too; give each its own file"));
   CHECK(refusal({}, {{"--sheet", one, ".png"}, {"--report", "", ".json"}}).empty());
   CHECK(refusal({"/dev/null"}, {{"--a", "/dev/null", ".png"}, {"--b", "/dev/null", {}}}).empty());
   CHECK(fs::is_empty(folder.path()));

@@ -65,7 +65,7 @@ bool is_legal(const Supervisor& before, Phase after, const SafetyInputs& in) {
 
 }  // namespace
 
-TEST_CASE("motors stay off until the device was parked and taken in hand") {
+TEST_CASE("motors stay off until the device was parked and picked up") {
   CHECK_FALSE(after({{kFree, 1000}}).motors_on());
   CHECK_FALSE(after({{kRested, 1000}}).motors_on());
   CHECK(after({{kSilent, 1000}}).phase == Phase::off);

@@ -257,7 +257,7 @@ TEST_CASE("axes that no file names are said, and any that are given are obeyed, 
       "b.nrrd", nrrd("uint8", "space: LPS\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n") + "\n" +
                     bytes_of(counting<std::uint8_t>()));
   CHECK(read_volume(named).axes_note.empty());
-  CHECK(has(refusal(named, {.axes = "RAS"}), "b.nrrd has axes of its own; leave it out"));
+  CHECK(has(refusal(named, {.axes = "RAS"}), "b.nrrd has axes; leave it out"));
 }
 
 TEST_CASE("a file without a header is refused where its size is not that of the layout") {

@@ -258,10 +258,10 @@ std::optional<Notice> HandLink::turned(State state) {
       return Notice{"hand: " + path_ + " is no kerf-emulator of this version; build both anew",
                     true};
     case State::absent:
-      return Notice{
-          had_it ? "hand: the emulator has gone; waiting for it at " + path_
-                 : "hand: nobody at " + path_ + "; start kerf-emulator with --hand-socket " + path_,
-          true};
+      return Notice{had_it ? "hand: the emulator has gone; waiting for it at " + path_
+                           : "hand: no emulator at " + path_ +
+                                 "; start kerf-emulator with --hand-socket " + path_,
+                    true};
     case State::asked:
       break;
   }

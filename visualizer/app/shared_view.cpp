@@ -38,7 +38,7 @@ std::optional<Notice> SharedView::follow(OrbitCamera& camera) {
     camera.look(pose_of(follower_->view()));
   }
   if (!std::exchange(asked_, true) && !presented) {
-    return Notice{"nobody presents a view yet (--present, or a page); your own view until then"};
+    return Notice{"no viewer presents a view yet (--present, or a page); your own view until then"};
   }
   if (had && !presented) return Notice{"the presenter has gone: this is the last view"};
   if (!had && presented && follows_) {

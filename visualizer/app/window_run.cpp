@@ -158,7 +158,7 @@ OverlayFigures WindowRun::figures_at(PictureSize size, Clock::time_point now) {
 
 void WindowRun::toggle_list(Clock::time_point now) {
   if (!options_.choice) {
-    notices_.say({"open: nobody waits for a choice; ./kerf demo does", true}, now);
+    notices_.say({"open: no demo waits for a choice; start ./kerf demo", true}, now);
   } else if (open_) {
     open_.reset();
   } else {

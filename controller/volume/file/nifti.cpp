@@ -150,7 +150,7 @@ void check_axes(const fs::path& path, const Nifti& h) {
                   std::to_string(h.dim[axis]) +
                       (axis == 4 ? " volumes along axis " : " values per voxel along axis ") +
                       std::to_string(axis),
-                  "save one of them to a file of its own");
+                  "save one of them as a separate file");
   }
 }
 

@@ -104,11 +104,11 @@ void check_axes(const fs::path& path, const Description& description, Slices& sl
   }
   if (names.size() > 1) {
     kerf::refuse(path.string(), ": its description has " + names[0] + " and " + names[1] +
-                                    "; save one volume, of slices alone, to a file of its own");
+                                    "; save one volume, of slices alone, as a separate file");
   }
   if (!names.empty() && (names[0] == "channels" || names[0] == "SizeC")) {
     kerf::refuse(path.string(), ": its description has " + short_text(images) +
-                                    " channels; save one of them to a file of its own");
+                                    " channels; save one of them as a separate file");
   }
   images = std::max(images, description.number("images").value_or(1));
   if (images > 1 && images != static_cast<double>(slices.size[2])) {

@@ -173,7 +173,7 @@ std::string take_axes(const std::string& location, const std::string& letters,
   if (!letters.empty()) {
     const auto given = axes_from("--axes", letters);
     if (claim.axes_known != 0) {
-      throw LoadError("--axes: " + location + " has axes of its own; leave it out");
+      throw LoadError("--axes: " + location + " has axes; leave it out");
     }
     claim.axes = given;
     return {};

@@ -19,7 +19,7 @@ REPORTS = [
         ("virtual", "", "true: in lock-step, without a clock"),
         ("end", "", "why the run ended"),
         ("waiting", "", "what the run waited for at the end: the device, or its own scene; empty: nothing"),
-        ("ticks", "", "servo steps since the device was taken in hand; the counts below are of these"),
+        ("ticks", "", "servo steps since the user picked up the device; the counts below are of these"),
         ("armed_at_tick", "", "tick of the segment and of the log that was the first of them"),
         ("overruns", "", "deadlines that were skipped because a tick ran over"),
         ("stale_ticks", "", "ticks that had no new report of the device, before it had gone"),

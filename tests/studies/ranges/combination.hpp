@@ -61,7 +61,7 @@ struct SceneOutcome {
 ///   line       a refusal of the loader is one line "place: value; way out"
 ///   faded      after 25 ms of silence the motors are off, without force
 ///   armed      50 ms parked at rest forgive every fault
-///   active     100 ms after it was taken in hand the motors are on, if they are known
+///   active     100 ms after it was picked up the motors are on, if they are known
 ///   removed    densities fall by exactly the amount that the ticks reported
 ///   again      a second servo gives the same bits for the same reports
 ///   recovered  a servo restored from the state after the last recovery gives the same bits

@@ -48,7 +48,7 @@ class Controller {
   int undos() { return asked(CommandKind::undo); }
   /// From the next tick on: the last stroke can be undone.
   void offer_undo() { flags_ = kFlagUndoable; }
-  /// From the next tick on: the device has been taken in hand.
+  /// From the next tick on: the device has been picked up.
   void take_in_hand() { flags_ = kFlagStarted; }
   /// How often it asked for a reset since the last call; forgets the tools that it asked for.
   int resets() { return asked(CommandKind::reset); }

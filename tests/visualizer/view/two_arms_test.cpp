@@ -223,7 +223,7 @@ TEST_CASE("a scene without the mark of the pulp has none in the window") {
   CHECK(!Session("two").pulp());
 }
 
-TEST_CASE("a run counts as armed from the first arm that is taken in hand") {
+TEST_CASE("a run counts as armed from the first arm that is picked up") {
   Run run;
   Session session("two");
   TickRecord parked = at(1, 0);
