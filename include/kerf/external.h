@@ -94,7 +94,7 @@ typedef struct {
   uint8_t more_room[256 - 2 * sizeof(uint64_t) - sizeof(kerf_force)];
 } kerf_external_arm;
 
-/* The page: `external-NAME.page` in the folder of the segment (docs/segment.md), rights 0600. The
+/* The page: `external-NAME.page` in the folder of the segment (docs/api.md), rights 0600. The
  * controller holds a lock on its first byte, the program on the whole file (flock). */
 typedef struct {
   uint64_t magic;

@@ -177,7 +177,7 @@ QUESTION = """\
 ## Which stiffness, and how it feels
 
 Which K may an arm render, for any push, in its worst direction, and what does a hand feel at 30 Hz? A map takes the
-device from a file; [`./kerf identify`](identify.md) writes that of yours. `examples/devices/premium15.toml` has a Phantom
+device from a file; [`./kerf identify`](gains.md#identify-your-device) writes that of yours. `examples/devices/premium15.toml` has a Phantom
 Premium 1.5 by published figures: a mass matrix, 2.6 times as heavy in one direction as in another. `worst` is the
 direction with the lowest stiffness that any push makes oscillate, by theory (docs/theory.md 5.7); `--direction 1,0,0.5`
 sets another one.

@@ -37,7 +37,7 @@ Three lines of NumPy read it (`python/` is a reader with more, `examples/python/
     print(np.abs(log["commanded_force_n"]).max(axis=0), "N")
 
 `log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
-`./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the
+`./kerf replay DIR/log` runs it again ([replay](determinism.md#run-a-recording-again)). `info` counts as lost what was published and is in no row, so the
 manifest says the same; a recorder that was killed leaves a manifest that says `running`, and all rows.
 
 NumPy reads the rows that the header counts. The recorder counts each 200 ms, when it makes sure that they are on the disk, so a log that
@@ -166,7 +166,7 @@ ROS 2 that use `/kerf/tick`, copy `ros/kerf_msgs` (installed: `share/kerf/ros/ke
 `ros2 bag play run.mcap`; its constants (`FLAGS_CONTACT`, `FAULT_OVERSPEED`) are the bits and codes below.
 
 Chunks are packed by LZ4, and `--unpacked` leaves them as they are. The other files of the recording are attached, with the volumes
-as they were at the start, so the MCAP of a whole recording replays on kerf's page ([browser.md](browser.md)); with `--from` or
+as they were at the start, so the MCAP of a whole recording replays on kerf's page ([kerf in a browser](second-machine.md#kerf-in-a-browser)); with `--from` or
 `--until` it has the messages alone. `ticks.npy.head` is the header of the log, whose rows are the bytes of `/kerf/tick` behind the
 four of CDR.
 

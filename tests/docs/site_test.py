@@ -28,7 +28,7 @@ NARROW = 390  # pixels of a phone
 SEARCHES = [("zigzag_mm", "script-keys.html#hands"), ("exit codes", "reports.html#exit-codes"),
             ("mouse pointer wheel", "window.html#a-hand-without-a-device-pointer-keys-gamepad-spacemouse"),
             ("threshold tissue HU", "own-volume.html#your-own-volume"),
-            ("omni encoder wire", "wire.html#omni"), ("state_head", "segment.html#segmentheader")]
+            ("omni encoder wire", "wire.html#omni"), ("state_head", "api.html#segmentheader")]
 
 
 class Loads(html.parser.HTMLParser):

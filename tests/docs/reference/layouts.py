@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/segment.md: the shared segment, byte by byte."""
+"""docs/api.md: the shared segment, byte by byte."""
 import re
 
 from source import Lack, Source, same, table

@@ -7,6 +7,7 @@ check: each file is what it would be if it were made now. A key, a field or a pr
 limits makes a difference, or is told as a lack."""
 import difflib
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -28,10 +29,14 @@ def page(text):
     return f"{title}\n\n{BY}{rest}\n"
 
 
+def demoted(text, title):
+    """A page as a part of another one, under another title."""
+    return re.sub(r"^#", "##", f"# {title}\n" + text.partition("\n")[2], flags=re.M)
+
+
 FILES = {
-    "docs/api.md": lambda *where: page(api.page(*where)),
+    "docs/api.md": lambda *where: page(api.page(*where) + demoted(layouts.segment(*where), "The shared memory")),
     "docs/script-keys.md": lambda *where: page(script_keys.page(*where)),
-    "docs/segment.md": lambda *where: page(layouts.segment(*where)),
     "docs/wire.md": lambda *where: page(wire.page(*where)),
     "docs/reports.md": lambda *where: page(f"{reports.page(*where).rstrip()}\n\n{exit_codes.section(*where)}"),
     "python/kerf_reader/tick.py": layouts.numpy_tick,

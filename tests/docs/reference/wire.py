@@ -264,7 +264,7 @@ def bridge(root):
             name, size = structs[kind], re.search(rf"sizeof\({structs[kind]}\) == (\d+)", file.text)[1]
             if not name.startswith(kind.removeprefix("k")) or file.struct(name)[1] != int(size):
                 raise Lack(f"{file.path}: {name} is not what its magic or its size says")
-            rows = struct_table(file, name).replace("where the run stands, above", "where the run stands ([segment](segment.md))")
+            rows = struct_table(file, name).replace("where the run stands, above", "where the run stands ([segment](api.md#the-shared-memory))")
             yield f"### `{name}`, `{mark}`\n\n{rows}\n"
     kinds = ", ".join(f'{value} `{word}` ({comment.removeprefix("argument: ")})'
                       for word, value, comment in command.enumerators("CommandKind"))
@@ -286,7 +286,7 @@ and token.
 The server says hello first, and again for a new run; then frames, records, replies and views. The viewer sends an
 acknowledgement for each frame that it has applied, commands, and its view where it presents it. What follows a head:
 
-* hello: the volumes' `VolumeDescriptor` ([segment](segment.md)). `off_labels` is 1 where there are labels; the other
+* hello: the volumes' `VolumeDescriptor` ([segment](api.md#the-shared-memory)). `off_labels` is 1 where there are labels; the other
   offsets are 0. Flags: {file.number('kMayCommand')} this viewer may send commands, {file.number('kTwoArms')} the run has two arms.
 * frame: u64 version for each block, u32 number for each block, then the payload: the blocks. Flags: {file.number('kPacked')} packed,
   {file.number('kLastOfPass')} last of a pass (the volumes are then those of `tick`), {file.number('kRunEnded')} the controller has gone.
