@@ -13,6 +13,7 @@
 #include "controller/load/load_scene.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
+#include "controller/plan/plan_tools.hpp"
 #include "tests/rig/tool_meshes.hpp"
 #include "tests/scene/support.hpp"
 #include "tests/support/property.hpp"
@@ -272,6 +273,34 @@ TEST_CASE("a press cuts the same share of the tool's volume in a volume of the c
   CHECK(fitted.spindle.inertia_g_mm2 / fitted.spindle.stall_torque_n_mm ==
         doctest::Approx(plain.spindle.inertia_g_mm2 / plain.spindle.stall_torque_n_mm));
   CHECK(device_stiffness_n_per_mm(fitted) == device_stiffness_n_per_mm(plain));
+}
+
+TEST_CASE(
+    "a bur cuts by its law of the hand's newtons, and wears alike, in a volume of the command "
+    "line") {
+  const TemporaryFolder folder;
+  constexpr double kEdgeMm = 0.5, kGrown = 4;  // over the phantom's voxels
+  static_cast<void>(block_scene(folder, kEdgeMm, kBall));
+  const auto base = folder.write("base.toml", "[[volume]]\nfile = \"phantom\"\n" + kBall +
+                                                  "force_exponent = 1.5\nsaturation_n = 0.6\n"
+                                                  "wear_half_n_s = 50\n");
+  SceneOverrides overrides;
+  overrides.volume_file = base.parent_path() / "block.nrrd";
+  const LoadedScene fitted = load_scene(base, overrides);
+  LoadedScene plain;
+  plain.tools.emplace_back().law = {
+      .force_exponent = 1.5, .saturation_n = 0.6, .wear_half_n_s = 50};
+  const auto share = [](const LoadedScene& scene, double device_n) {
+    const auto law = plan_law<DoubleNumbers>(scene, scene.tools.at(0));
+    return scene.cut.machinability_mm3_per_s_n *
+           cut_drive<DoubleNumbers>(law, device_n / scene.device.workspace_scale, 1);
+  };
+  for (const double device_n : {0.1, 0.3, 0.9}) {
+    CHECK(share(fitted, device_n) / (kGrown * kGrown * kGrown) ==
+          doctest::Approx(share(plain, device_n)));
+  }
+  CHECK(fitted.tools.at(0).law.wear_half_n_s * fitted.device.workspace_scale ==
+        doctest::Approx(50));
 }
 
 TEST_CASE("power is kept between hand and scene: F dx is the same on both sides") {
