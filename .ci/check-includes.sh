@@ -32,7 +32,7 @@ hil hil/device hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/fro
 
 standin standin/hd standin/dhd standin/wheel
 
-lab/run lab/rig lab/accuracy lab/bench lab/stability lab/impedance lab/safety lab/commands lab
+lab/run lab/rig lab/accuracy lab/bench lab/stability lab/impedance lab/safety lab/commands lab/reproduce lab
 
 face
 

@@ -24,6 +24,8 @@ PAGES = {
     "docs/contact.md": ("./kerf studies extremes --data DIR --page docs/contact.md",
                         ["tests/studies/contact/*", "lab/report/contact.py", "tests/rig/*", *RIG]),
     "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*", "lab/report/energy.py", "lab/rig/port_loop.hpp", "controller/law/*"]),
+    "docs/reality.md": ("./kerf lab reproduce --page docs/reality.md",
+                        ["lab/reproduce/*", "lab/report/reproduce*", "controller/stability/*"]),
     "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
                           ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*", "lab/report/stability*"]),
     "docs/performance.md#kernels": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", "lab/report/kernels.py", *RIG]),
@@ -40,7 +42,7 @@ def sources(globs):
     """The files of some globs; those of a glob behind ! are left out. A glob without a file is an error of the table."""
     found, left_out = set(), set()
     for glob in globs:
-        files = {file for file in ROOT.glob(glob.lstrip("!")) if file.is_file() and file.suffix in (".cpp", ".hpp", ".py")}
+        files = {file for file in ROOT.glob(glob.lstrip("!")) if file.is_file() and file.suffix in (".cpp", ".hpp", ".py", ".toml")}
         if not files:
             sys.exit(f"check-pages: {glob}: no such source; correct the table of .ci/check-pages.py")
         (left_out if glob.startswith("!") else found).update(files)
@@ -50,6 +52,8 @@ def sources(globs):
 def code_of(file):
     """What a file does: its code without comments, and with a space only between two words."""
     text = file.read_text(encoding="utf-8")
+    if file.suffix == ".toml":
+        return "\n".join(line for line in text.splitlines() if line.strip() and not line.startswith("#"))
     if file.suffix != ".py":
         text = CPP_TOKEN.sub(lambda found: found["kept"] or "\0", text)
         return re.sub(r"(?<=\w)\0(?=\w)", " ", text).replace("\0", "")

@@ -32,7 +32,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const std::array commands{
       make_zwidth_command(app), make_impedance_command(app), make_sweep_command(app),
       make_faults_command(app), make_accuracy_command(app),  make_energy_command(app),
-      make_laws_command(app),   make_bench_command(app),
+      make_laws_command(app),   make_bench_command(app),     make_reproduce_command(app),
   };
   return run_chosen(app, commands, "kerf-lab", argc, argv, out, err);
 }

@@ -28,6 +28,8 @@ KINDS = {
     ("impedance", "plot"): True,
     ("stability", "measure"): False, ("stability", "page"): False, ("stability", "devices"): True,
     ("stability", "rates"): True,
+    ("reproduce", "measure"): False, ("reproduce", "tables"): False, ("reproduce", "page"): False,
+    ("reproduce", "regions"): True, ("reproduce", "energy"): True,
     ("stability_map", "map"): True, ("stability_map", "portraits"): True,
 }
 DEBIAN = "/usr/bin/python3"  # it has Debian's matplotlib, if another Python comes first in PATH

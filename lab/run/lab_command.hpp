@@ -45,6 +45,7 @@ class LabCommand {
 [[nodiscard]] std::unique_ptr<LabCommand> make_faults_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_impedance_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_laws_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_reproduce_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_sweep_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_zwidth_command(Arguments& program);
 

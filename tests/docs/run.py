@@ -56,7 +56,8 @@ NOT_HERE = {
     "installs packages and builds": ["./kerf setup$", "./kerf page"],
     "serves until it is ended; the test web has a server of its own": ["python3 -m http.server"],
     "measures for minutes; the tests of lab run parts of it": [
-        "./kerf lab accuracy --page", "./kerf studies extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all"],
+        "./kerf lab accuracy --page", "./kerf studies extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all",
+        "./kerf lab reproduce"],
     "needs network namespaces; the test bridge_net does the same": ["./kerf demo --two-machines"],
     "names a program or an option, and is no whole command": [
         "./kerf controller$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
