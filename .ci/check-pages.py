@@ -27,7 +27,7 @@ PAGES = {
     "docs/reality.md": ("./kerf lab reproduce --page docs/reality.md",
                         ["lab/reproduce/*", "lab/report/reproduce*", "controller/stability/*"]),
     "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
-                          ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*", "lab/report/stability*"]),
+                          ["lab/stability/*", "!lab/stability/energy_*", "lab/impedance/*", "controller/stability/*", "lab/report/stability*"]),
     "docs/performance.md#kernels": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", "lab/report/kernels.py", *RIG]),
     "docs/performance.md#pictures": ("./kerf bench pictures --page docs/performance.md", ["visualizer/bench/*", "lab/report/pictures.py"]),
     "docs/performance.md#bridge": ("./kerf bench bridge --page docs/performance.md", ["tests/studies/bridge/*"]),
