@@ -23,7 +23,10 @@ import tempfile
 import text
 from stability_map import AXES, NEVER, crossing, lowest
 
+# The folder that has examples/: a clone's, or of an installed kerf that of its pages.
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+if not os.path.isdir(os.path.join(ROOT, "examples")):
+    ROOT = os.path.join(ROOT, "..", "doc", "kerf")
 
 ABOUT = """\
 # Stability
