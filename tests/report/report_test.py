@@ -107,9 +107,12 @@ def accuracy_rows():
     names = {found[1] for found in re.finditer(r"\{([^{}|]+)\|", accuracy.ADVICE)} | {"0.125 mm"}
     metrics = {column[1:4:2] for _, _, columns in accuracy.TABLES for column in columns}
     metrics |= {(metric, shape) for metric in ("force_vs_theory_rms", "force_vs_theory_max") for shape in accuracy.SHAPES}
-    return [{"knob": "kernel", "value": name, "standard": name == "Q15", "plain": name == "Q8", "shape": shape,
+    proxy = {(column[1], shape) for column in accuracy.PROXY_COLUMNS for shape in (column[3], *accuracy.SHAPES)}
+    choices = [("kernel", name, name == "Q15", metrics) for name in sorted(names)]
+    choices += [(knob, value, value == "0.125 mm", proxy) for knob, _ in accuracy.PROXY_KNOBS for value in ("0.125 mm", "finer")]
+    return [{"knob": knob, "value": name, "standard": standard, "plain": name == "Q8", "shape": shape,
              "metric": metric, "figure": 0.01 * (place + 1), "unit": "1", "us_p50": 1 + place, "us_p99": 2 + place}
-            for place, name in enumerate(sorted(names)) for metric, shape in sorted(metrics)]
+            for place, (knob, name, standard, its) in enumerate(choices) for metric, shape in sorted(its)]
 
 
 ACCURACY = {"provenance": "a day, a machine.", "rows": accuracy_rows()}
