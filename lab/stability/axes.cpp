@@ -182,7 +182,7 @@ void check(AxisId axis, const std::string& value) {
       fail(kind, value,
            "is no number from " + number_text(kind.lowest) + " to " + number_text(kind.highest) +
                (*kind.unit ? std::string(" ") + kind.unit : "") +
-               (*kind.words ? std::string(", nor ") + kind.words : "") +
+               (*kind.words ? std::string(", nor \"") + kind.words + "\"" : "") +
                "; give one, a list (0,1,2) or a range (0:3:4: from, to, count up to " +
                std::to_string(kMostValues) + ")");
     }
