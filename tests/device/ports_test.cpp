@@ -445,11 +445,11 @@ TEST_CASE("a partner that does not fit, has ended or does not answer is refused"
   ended.gone = true;
   CHECK(has(refusal_of(ended, 5000), "--stay"));
   FakePort mute;
-  CHECK(refusal_of(mute, 450).starts_with("--port x: nobody answers the hello"));
+  CHECK(refusal_of(mute, 450).starts_with("--port x: no answer to the hello"));
   CHECK(mute.sent.size() >= 2);
   CHECK(mute.sent.size() <= 3);  // each 0.2 s
   const std::atomic<bool> stop{true};
-  CHECK(has(refusal_of(mute, 60000, stop), "nobody answers"));
+  CHECK(has(refusal_of(mute, 60000, stop), "no answer"));
 }
 
 }  // namespace kerf::ports_test
