@@ -25,12 +25,12 @@ One tick of the servo's kernels on 256 x 256 x 161 voxels, at the costliest posi
 kept from tick to tick.
 
 * `paper` is the paper's own form at -O2: an array of structures with the stored float gradient, and a dense 5x5x5
-  refresh of the voxels that a cut changed. Ratios divide its time.
+  refresh of the voxels that a cut changed. The ratio of a row is the time of `paper` over that of the row.
 * `reference` is the plain fixed-point code with stored gradients.
-* `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits: the method `aligned` for tools
-  that are not rotated, and for tools in any pose (`any`) the method `gather` for contact and `splat` for milling.
-  A machine that lacks a set leaves its rows as they were; a line then says which machine they are of.
-* `bytes` is the memory of the tick beyond two bytes a voxel.
+* `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits. Tools that are not rotated use the
+  method `aligned`; tools in any pose (`any`) use `gather` for contact and `splat` for milling. If a machine has no such
+  instruction set, its rows stay as they were, and a line names the machine that measured them.
+* `bytes` is the memory that the tick needs besides the two bytes of each voxel.
 
 """
 
@@ -39,8 +39,8 @@ QUERIES = """
 
 The contact of a tool at one position, from samples of its surface: a ball of radius 8 voxels (805 samples)
 and a cylinder of radius 5 and length 16 (658). `slide` is 2 voxels deep in a ball of radius 40, `half` is half inside
-a flat solid, `immersed` is wholly inside. `turn` rotates the samples. A tick takes 2 or 3 queries while it slides and at
-most 32. The ratio divides the plain loop, which is `scalar`.
+a flat solid, `immersed` is wholly inside. `turn` rotates the samples. A tick takes 2 or 3 queries while the tool
+slides, and at most 32. The ratio is the time of the plain loop, `scalar`, over that of the row.
 
 """
 
@@ -48,8 +48,9 @@ LAYOUT = """
 ## Layout of the volume
 
 The servo stores its volume linearly, x fastest. The alternative is bricks of 8x8x8 voxels. The first rows compare
-copies of a tool's box out of both, with warm caches and after 96 MB went through the caches before each tick; the ratio
-divides the linear copy. The others are one tool in volumes of three sizes; the ratio divides the smallest.
+copies of the tool's box from both layouts, with warm caches and (`cold`) after 96 MB went through the caches before each
+tick; the ratio is the time of the linear copy over that of the row. The other rows are one tool in volumes of three sizes;
+their ratio is the time in the smallest volume over that of the row.
 
 """
 

@@ -23,7 +23,7 @@ paper's padded tooth, and it fills the picture.
 * `static`: the whole picture is drawn.
 * `10^3`, `16^3`: the whole picture is drawn after a ball of so many voxels was cut.
 * `partial`: only the pixels that this cut can have changed are drawn, as the visualizer does while the camera rests.
-* `fps`: one over the median wall time; `cpu ms`: the median, summed over the threads. Each figure has 3 to 10 frames.
+* `fps`: one over the median wall time; `cpu ms`: the median, summed over the threads. Each figure is of 3 to 10 frames.
 * `paper`: the frame rate that the paper reports for its technique of the same kind, static / while milling, on its own
   hardware. It does not predict the rate of this machine.
 
@@ -36,14 +36,13 @@ GRADIENTS = """
 
 The cost of `--gradient` for `iso` on the padded 256x256x161 volume, and the angle between its normals and the exact ones
 on a ball of 28 voxels radius, root mean square and for 99 of 100 pixels: `ball` has a border that is antialiased over two
-voxels, `noisy` noise of 1.5 % of full density too, and `milled` is a hollow as a ball leaves it that stays: its voxels are
+voxels, `noisy` has noise of 1.5 % of full density too, and `milled` is the hollow that a ball has cut: its voxels are
 nearly full or empty. `1x1x2`, `1x1x5` and `1x1x10` are the ball in voxels so thick, for 99 of 100 pixels. Each gradient is
-stored in 8 bytes a voxel and computed again around a cut. `adaptive` takes 15x15x15 voxels where these hardly turn the
-normal of `farid5`, 5x5x5 voxels; at an edge they do, and `farid5` stays. Of unequal voxels it takes as many mm along each
-axis, five of the longest edges to each side; the others count voxels. `surface`, `cast`, exported surfaces and the page
+stored in 8 bytes a voxel and computed again around a cut. `adaptive` uses 15x15x15 voxels if their normal differs
+little from that of `farid5`, which uses 5x5x5 voxels; at an edge it differs, and `farid5` is used. If the edges of a voxel
+differ, `adaptive` uses equal lengths along each axis, five of the longest edges to each side; the others count voxels. `surface`, `cast`, exported surfaces and the page
 shade by the same gradients; their tests hold `adaptive` to 3 degrees for 99 of 100 points of a ball from 1x1x1 to 1x10x10.
-`corners` turns the highest frequency of the voxels round, so it draws a hatching on smooth surfaces, and `central` draws
-rings.
+`corners` inverts the highest frequency of the voxels, so it draws a hatching on smooth surfaces; `central` draws rings.
 
 """
 

@@ -308,12 +308,12 @@ HEAD = """\
 # Held against published numbers
 
 `./kerf lab reproduce --page docs/reality.md` makes this page: each number of the column `kerf` comes from a run of kerf's own code,
-none is typed in. A *match* is within what the row names; a *miss* is printed and explained, never left out. *Shown* stands where a
-source leaves out what a verdict needs. Where a parameter is not published only orders, exponents and directions are compared, so a
-match of such a row says no more than that.
+none is typed in. A *match* is within the tolerance of its row. A *miss* is printed and explained, never left out. A row is *shown*
+without a verdict if its source leaves out something that a verdict needs. If a parameter is not published, only orders, exponents
+and directions are compared, so a match of such a row says no more than that.
 
-kerf has never been run on a device for this page, and nothing here was measured on one. Most sources were read as abstracts or as
-quoted by others; the last section says which.
+Nothing here was measured on a device. Most sources were read as abstracts or as quoted by others; [Sources](#sources) has what was
+read of each.
 
 """
 
@@ -432,13 +432,13 @@ REGIONS = """\
 The axes are those of Diolaiti et al.: damping b over K T, and friction f over K times the encoder step D. Each square is two runs
 against a spring wall of 1 N/mm (0.1 kg, 1 kHz, steps of 0.1 mm, no delay, exact numbers, no limits): a push of 0.05 N on the wall's
 face, and a hit at 200 mm/s with 1 N. Right of b/(KT) = 1/2 and above f/(KD) = 1/2 the wall is passive. Left of it and above f/(KD) =
-1/2 it rests all the same, in violation of passivity: friction takes what the hold gives. Below f/(KD) = 1/2 friction does not
-hold the force of one encoder step, and whether the tip comes to rest depends on how it came.
+1/2 the wall is not passive, and the tip settles all the same: friction dissipates the energy that sampling adds. Below f/(KD) = 1/2
+friction does not hold the force of one encoder step, and whether the tip settles depends on the press.
 
 """
 
 ENERGY = """\
-Energy that the port has taken from the hand, by the motors' true work: below 0 the wall gives energy. A mass of 0.1 kg with
+The energy that the port has taken from the hand, from the true work of the motors: below 0 the wall has given energy. A mass of 0.1 kg with
 0.2 N s/m falls onto the wall from 1 mm with 1 N. Observer and controller are those of the servo (docs/theory.md 5.6), at 1 kHz.
 
 """

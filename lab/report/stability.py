@@ -39,12 +39,12 @@ The Z-width of a device is the range of stiffness K that it can render, from fre
 sampled wall adds a little energy in every tick; damping of device, wall and hand removes it. Above some K more is added
 than removed, and the tip oscillates.
 
-Each cell of a map is a simulated device at a flat wall, without a hand unless stated. A *press* is one run of it: the tip
+Each cell of a map is a simulated device at a flat wall, without a hand unless stated. A *press* is one run of such a cell: the tip
 starts at a distance from the wall with a speed, and a constant force above friction pushes it on. Each stiffness gets three
-standard presses (0.5 N from 0.1 mm at 0, 50 and 200 mm/s) and two presses of a sequence. From one stiffness to the next the
-sequence fills evenly all pushes from 0.05 N to 0.9 of the peak force, speeds up to 500 mm/s and distances up to 2 mm. All
-presses are repeated for each seed, and a cell has the worst verdict of all. `--push`, `--hit` and `--start` set one of the
-three, or a list of it as an axis.
+standard presses (0.5 N from 0.1 mm at 0, 50 and 200 mm/s) and two presses of a sequence. Over all stiffnesses the sequence
+covers evenly the pushes from 0.05 N to 0.9 of the peak force, speeds up to 500 mm/s and distances up to 2 mm. All presses
+are repeated for each seed, and a cell has the worst verdict of all. `--push`, `--hit` and `--start` fix the push, the speed
+and the distance; a list of values makes one of them an axis of the map.
 
 The verdicts, by the names of their columns:
 
@@ -61,13 +61,13 @@ The verdicts, by the names of their columns:
 
 How a map is searched:
 
-* A run ends when it is proven to have settled, else after 60 s, and later if mass and damping make its motion slower than that.
+* A run ends when it is proven to have settled, else after 60 s, or later if mass and damping make the motion slower than that.
   An oscillation with friction and encoder steps is chaotic: one run in a hundred stops only after 3 to 45 s. `--seconds`
   makes the limit longer, never shorter, so no verdict depends on it.
 * *First* is the lowest K of a column at which a run of any seed oscillates or is active. The search goes upwards in steps of
-  1 %. Then it goes down with presses near the bad one, as long as one of them is bad 2 % lower, and ends by halving to 0.5 %.
-  For the whole arm it uses the steps of the map, halved to 0.5 %. Cells above *first* are tried with the bad press, too. The
-  picture has a bar from the lowest to the highest *first* of a single seed. Stable cells above are reported separately,
+  1 %. Then presses near the bad one are tried 2 % lower, again and again until none of them is bad, and the last step is halved to
+  0.5 %. For the whole arm the search goes upwards in the steps of the map, and halves the last one to 0.5 %. Cells above
+  *first* are tried with the bad press, too. The picture has a bar from the lowest to the highest *first* of a single seed. Stable cells above are reported separately,
   because a hand cannot reach them.
 * With friction the worst push is about half of the peak: the oscillation then has the most room between no force and the
   peak, and friction takes the smallest part of a large oscillation (docs/theory.md 5.7).
@@ -90,16 +90,16 @@ The lowest K in N/mm that oscillates or is active, at two dampings B: the defaul
 device's map.
 
 * *Linear, exact* is the boundary of another loop: a linear two-sided wall with the backward difference, in double,
-  without friction, encoder steps and limits. A picture draws it solid for that loop alone, dotted beside others.
+  without friction, encoder steps and limits. In the picture it is a solid line in a map of that loop, and a dotted line in all others.
 * The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
 * Each measured K is the lowest of five seeds; undecided counts as unstable. The whole arm has 14 stiffnesses.
 * *Safe K, emulated* is the minimum of the row over 1.5, for the emulated device alone. The margin covers phases and islands between two
   steps that no run of the map met. Of 10,000 random presses at each of them none oscillates or is active (`zwidth_maps`, the
-  part `ranges` of `.ci/all`); a few in 180,000 are undecided: push and twice the friction are the peak there, so the tip creeps out.
+  part `ranges` of `.ci/all`); a few in 180,000 are undecided: there the push plus twice the friction is the peak force, so the tip creeps out.
 * **Safe K, real unit**, in bold, is the highest stiffness of the row's device and B that `kerf controller --check` accepts without a warning at
-  1 kHz: **the one to use with a real device that nobody has measured**. It assumes less viscous damping than the emulator has
-  (0.0002 N s/mm), a delay of 2 ms in each row, and takes nothing above the published maximum of the device
-  ([gains](gains.md)). A row without it has a B above that maximum.
+  1 kHz: **the one to use with a real device that nobody has measured**. It assumes a viscous damping of
+  0.0002 N s/mm, less than that of the emulator, and a delay of 2 ms in each row. It never exceeds the published maximum of the
+  device ([gains](gains.md)). *none*: B is above the published maximum.
 * The delay of a real device is not known; assume two periods until you measure it.
 * Take no more damping than the map shows as stable: beyond its maximum the lag of the velocity and the encoder steps
   drive the oscillation.
@@ -109,18 +109,18 @@ device's map.
 STABILISERS = """
 ## Stabilisers
 
-The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed.
+The lowest unstable K with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping, as one axis / whole arm, of one seed.
 A stabiliser helps against a light push alone (`--push 0.5`) far more than against a hard one.
 docs/energy.md has the effect on the hand. `passivity` accounts for a force in the tick that commands it. With a delay the force
 acts later, and the port may give far more energy than the account shows: `port_minimum_mj` of `--csv` has the lowest energy of the
-port in each cell. A run that oscillates and is active ends its cell.
+port in each cell. The first run that both oscillates and is active ends the search of its cell.
 
 """
 
 RATES = """\
-Without friction the boundary grows in proportion to the rate; measured, it grows less. Encoder steps are the same at
-every rate. The velocity window spans up to 16 ms at every rate, so its lag is more periods of a fast loop, which
-tolerates less damping than the linear boundary predicts. In grey columns the damping is unstable without any wall.
+By the linear theory, without friction, the boundary grows in proportion to the rate. The measured one grows less. Encoder
+steps are the same at every rate. The velocity window spans up to 16 ms at every rate, so at a high rate its lag is more
+periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns the damping is unstable without any wall.
 
 """
 
@@ -134,8 +134,8 @@ the first crossing. Five seeds, 40 stiffnesses from 0.05 to 50 N/mm.
 """
 
 NUMBERS = """
-They differ if a run is chaotic, as near every boundary of a loop with friction and encoder steps: a difference of 2^-16 mm
-or N moves an encoder step to another tick, and with it the rest position of the tip. Neither number type is better in
+The two differ if a run is chaotic. Near every boundary of a loop with friction and encoder steps it is: a difference of 2^-16 mm
+or N moves an encoder step to another tick, and with it the position at which the tip settles. Neither number type is better in
 general.
 
 """
@@ -148,7 +148,7 @@ no rows.
 
 | column | unit | meaning |
 |---|---|---|
-| loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits, push_n, hit_mm_per_s, start_mm | in the name | value of each axis, given or standard; `any` of a press: searched |
+| loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits, push_n, hit_mm_per_s, start_mm | in the name | value of each axis, as given or the default; `any` for a push, speed or distance: searched |
 | stiffness_n_per_mm | N/mm | K of the cell |
 | swings, active, undecided, arithmetic | 0 or 1 | verdict of the worst run; a cell with four zeros is proven to settle |
 | travel_mm | mm | peak to peak in the last half of a run, the largest of all runs; 0: held by friction |
@@ -159,17 +159,17 @@ no rows.
 
 | key | meaning |
 |---|---|
-| version, seed, seeds, seconds, whole_arm | of the run: program, first seed, number of seeds, least limit of a run, `--arm` |
+| version, seed, seeds, seconds, whole_arm | version of the program, first seed, number of seeds, shortest time limit of a run, whether with `--arm` |
 | mapped, varied | axes of the picture; axes with several values |
-| stiffness_n_per_mm | of the cells of each column, N/mm |
+| stiffness_n_per_mm | stiffness of each cell of a column, N/mm |
 | columns | a list, one for each combination of the other axes, of the following |
 | axes | value of each axis as a text, by the names of the CSV |
-| impossible | why the column has no cells; null: it has |
+| impossible | reason for a column without cells; null: it has cells |
 | by_travel, by_energy | crossings by *swings* and *active*, each with the next four rows |
 | first_n_per_mm, reason | lowest K of all seeds; or null, and the reason: `below all`, `above all`, `undecided` (no cell is bad, one is undecided), `not measured` |
 | last_n_per_mm, last_reason | the same of the seed that crosses last |
-| by_seed_n_per_mm, band_n_per_mm | lowest K of each seed, and of the seed below which 5 and 95 % of them are: `--seeds 200`; null: none, or below all |
-| re_entry_from_n_per_mm, re_entry_to_n_per_mm | cells above the first crossing that rest again; null: none |
+| by_seed_n_per_mm, band_n_per_mm | lowest K of each seed, and the quantiles of 5 and 95 % over the seeds (use `--seeds 200`); null: none, or below all |
+| re_entry_from_n_per_mm, re_entry_to_n_per_mm | range of K above the first crossing in which cells settle again; null: none |
 | undecided_from_n_per_mm | lowest K at which a run is undecided; null: none |
 | analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop, 0: nothing is stable, null: for another loop; exact_holds, passive_holds: whether this column's loop is the one of the bound |
 | cells | swings, active, undecided, arithmetic, travel_mm, given_mj, port_minimum_mj of each stiffness |
@@ -179,16 +179,17 @@ no rows.
 QUESTION = """\
 ## Which stiffness, and how it feels
 
-Which K may an arm render, for any push, in its worst direction, and what does a hand feel at 30 Hz? A map takes the
-device from a file; [`./kerf identify`](gains.md#identify-your-device) writes that of yours. `examples/devices/premium15.toml` has a Phantom
-Premium 1.5 by published figures: a mass matrix, 2.6 times as heavy in one direction as in another. `worst` is the
+Which K may a device render, for any push, in its worst direction, and what does a hand feel at 30 Hz? A map can take the
+device from a file; [`./kerf identify`](gains.md#identify-your-device) writes such a file for your device.
+`examples/devices/premium15.toml` is a Phantom Premium 1.5 by published figures. Its mass is a matrix: 2.6 times as heavy in one
+direction as in another. `worst` is the
 direction with the lowest stiffness that any push makes oscillate, by theory (docs/theory.md 5.7); `--direction 1,0,0.5`
 sets another one.
 
 """
 
 ANSWER = """
-So it may render {k} N/mm at B = {b} N s/mm, the lowest K over 1.5 as in the table above. That wall over frequency:
+So it may render {k} N/mm at B = {b} N s/mm, the lowest K over 1.5 as in the table above. The same wall over frequency:
 
 """
 
@@ -196,9 +197,9 @@ FELT = """
 At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is stiffer and less damped than the wall of the theory
 (docs/theory.md 5.8), because `foaw` lags behind the difference that the theory has. At the device's port it feels
 {port_k} N/mm and {port_b} N s/mm, since the mass counts against the spring. Where the damping is negative, the hand gets energy,
-unless it damps more than that itself. `--estimator difference` has the theory's wall, `--arm` measures the whole servo step
-with an emulated device, and `--log DIR` takes the wall from a recording ([log](log.md)) in which a hand shook within it, slowly
-and faster and faster, as a chirp does. `--plot` draws the figures.
+unless it damps more than that itself. `--estimator difference` gives the wall of the theory, and `--arm` measures the whole
+servo step with an emulated device. `--log DIR` measures the wall in a recording ([log](log.md)) of a hand that moves to and fro
+in it, faster and faster, like a chirp. `--plot` draws the figures.
 
 """
 
@@ -217,8 +218,8 @@ HOW = """\
 `--law`, `--estimator` and `--stabiliser` also take the laws that your own program registers (docs/own-law.md).
 
 A map larger than one machine is cut into shards. Each keeps its finished columns in a part file and goes on from there
-when it is started again; `--merge` refuses parts of other seeds, programs or axes, and names what is missing. With GNU
-parallel, and as a job array of Slurm (`examples/cluster/zwidth.sbatch`):
+when it is started again; `--merge` refuses parts of other seeds, programs or axes, and names what is missing. `examples/cluster/zwidth.sbatch`
+is a job array of Slurm. With GNU parallel:
 
     parallel ./kerf lab zwidth --rate 250,500,1000,2000 --jobs 1 --shard {}/8 --part zwidth-{}.part ::: {1..8}
     ./kerf lab zwidth --merge zwidth-*.part --plot zwidth.svg --csv zwidth.csv --json zwidth.json
