@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 RIG = ["lab/rig/*"]
 # Page, or page#part, the command that makes it, the sources of its rows and texts.
 PAGES = {
-    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py"]),
+    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py", "lab/rig/contact_rig.*"]),
     "docs/contact.md": ("./kerf studies extremes --data DIR --page docs/contact.md",
                         ["tests/studies/contact/*", "lab/report/contact.py", "tests/rig/*", *RIG]),
     "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*", "lab/report/energy.py", "lab/rig/port_loop.hpp", "controller/law/*"]),
