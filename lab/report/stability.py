@@ -51,10 +51,11 @@ The verdicts, by the names of their columns:
 * *rests* (settles): proven for each run. Either friction holds the tip under a constant force for longer than the memory of
   the loop, or in the last half of the run the travel is at most one encoder step and the motors give at most the energy of
   a push over it. A loop without encoder steps settles if the travel is at most 0.0001 mm.
-* *swings* (oscillates): in both halves of the last half of a run the tip reverses at least twice, each time after more than
-  one encoder step, and its travel does not fall over all of eight windows. A creeping tip does not reverse, so it does not
-  count as oscillating.
-* *active*: in both halves of the last half the motors give more energy than a push over one encoder step takes.
+* *swings* (oscillates): the last half of a run has eight windows. In the first four and in the last four of them the tip
+  reverses at least twice, each time after more than one encoder step, and its travel does not decrease from each window to
+  the next. A creeping tip does not reverse, so it does not count as oscillating.
+* *active*: in the first four windows and in the last four the motors give more energy than a push over one encoder step
+  takes, and neither the travel nor this energy decreases from each window to the next.
 * *arithmetic*: only the rounding of fixed-point numbers keeps up a motion. The loop has no encoder steps, the travel is below
   1 µm, and the same runs settle in double. It counts as stable.
 * *undecided*: any other cell.
