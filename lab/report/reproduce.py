@@ -15,6 +15,7 @@ returns the JSON that tables, page, regions and energy read:
 A file of rows is TOML: `functions`, a Python file with further functions (optional), [[source]] tables {name, cite, seen} and [[row]]
 tables {source, place, group, what, published, unit, function, parameters, compare, held, unknown, why}."""
 import concurrent.futures
+import contextlib
 import importlib.util
 import inspect
 import json
@@ -22,7 +23,9 @@ import math
 import os
 import pathlib
 import re
+import stat
 import subprocess
+import sys
 import tempfile
 import threading
 import tomllib
@@ -37,8 +40,10 @@ UNITS = {"N/mm": ("stiffness", 1), "N/m": ("stiffness", 1e-3), "N s/mm": ("dampi
          "N": ("force", 1), "mm": ("length", 1), "m": ("length", 1e3), "um": ("length", 1e-3), "kg": ("mass", 1), "g": ("mass", 1e-3),
          "s": ("time", 1), "ms": ("time", 1e-3), "Hz": ("rate", 1), "kHz": ("rate", 1e3), "mJ": ("energy", 1), "uJ": ("energy", 1e-3),
          "mm3/s": ("removal", 1), "%": ("share", 0.01), "1": ("number", 1), "text": ("text", None)}
-COMPARE = re.compile(r"within (?P<percent>[\d.]+) %|within a factor of (?P<factor>[\d.]+)|within (?P<off>[\d.]+)|"
+COMPARE = re.compile(r"within (?P<percent>\d+(\.\d+)?) %|within a factor of (?P<factor>\d+(\.\d+)?)|within (?P<off>\d+(\.\d+)?)|"
                      r"(?P<bound>at least|at most|equal|shown)")
+LARGEST = 1e300  # of what is published: a quotient of it and kerf's number is finite
+MOST_BYTES = 1 << 20  # of a file of rows
 SOURCE_KEYS = {"name", "cite", "seen"}
 ROW_KEYS = {"source", "place", "group", "what", "published", "unit", "function", "compare", "held"}
 MORE_KEYS = {"parameters", "unknown", "why"}
@@ -144,6 +149,9 @@ def refuse(path, place, why):
 def load(path):
     """Sources by their names, rows and functions of a file, checked. Errors have one line: file, place, way out."""
     try:
+        found = os.stat(path)
+        if not stat.S_ISREG(found.st_mode) or found.st_size > MOST_BYTES:
+            raise text.BadInput(f"{path}: is no regular file of at most 1 MiB; name a file of rows")
         with open(path, "rb") as file:
             data = tomllib.load(file)
     except OSError as error:
@@ -179,12 +187,14 @@ def tables_of(path, data, name):
 
 
 def functions_of(path):
+    if path.suffix != ".py":
+        raise text.BadInput(f"{path}: is no Python file; let `functions` name one that ends in .py")
     spec = importlib.util.spec_from_file_location("own_rows", path)
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except (OSError, SyntaxError) as error:
-        raise text.BadInput(f"{path}: {error}; correct it, or leave `functions` out") from None
+    except (Exception, SystemExit) as error:  # a reader's file may raise anything
+        raise text.BadInput(f"{path}: {type(error).__name__}: {error}; correct it, or leave `functions` out") from None
     return {name: value for name, value in vars(module).items() if hasattr(value, "unit")}
 
 
@@ -207,9 +217,13 @@ def check_row(path, place, row, sources, functions):
     if isinstance(row["published"], bool) or not isinstance(row["published"], str if row["unit"] == "text" else (int, float)):
         refuse(path, place, f"published: {row['published']}: " + ("is no text; write one" if row["unit"] == "text" else
                                                                  "is no number; give one, or the unit \"text\""))
+    if row["unit"] != "text" and not abs(row["published"]) <= LARGEST:
+        refuse(path, place, f"published: {row['published']:g}: is not finite; give the number of the source")
     function = functions.get(row["function"])
     if function is None:
         refuse(path, place, f"function: {row['function']}: unknown; there are {', '.join(sorted(functions))}")
+    if function.unit != "any" and str(function.unit) not in UNITS:
+        refuse(path, place, f"function: {row['function']}: gives {function.unit}, an unknown unit; take any or one of {', '.join(UNITS)}")
     if function.unit != "any" and UNITS[function.unit][0] != UNITS[row["unit"]][0]:
         refuse(path, place, f"unit: {row['unit']}: the function {row['function']} gives {function.unit}; take its kind of unit")
     parameters = row.setdefault("parameters", {})
@@ -225,6 +239,8 @@ def check_row(path, place, row, sources, functions):
     if not compare:
         refuse(path, place, f"compare: {row['compare']}: unknown; give within N %, within a factor of N, within N, at least, at most, "
                             "equal or shown")
+    if compare["factor"] and float(compare["factor"]) < 1:
+        refuse(path, place, f"compare: {row['compare']}: no number is within it; give a factor of 1 or more")
     if (row["unit"] == "text") != (compare["bound"] == "equal"):
         refuse(path, place, f"compare: {row['compare']}: texts are equal or not, numbers are near; take the other")
     if "unknown" in row and compare["percent"]:
@@ -255,7 +271,7 @@ def measure_row(kerf, row, function, path):
         value = function(kerf, **row["parameters"])
     except text.BadInput as error:
         refuse(path, f"row ({row['what'][:60]})", str(error))
-    except (ArithmeticError, KeyError, LookupError, TypeError, ValueError) as error:
+    except (Exception, SystemExit) as error:  # a reader's function may raise anything
         refuse(path, f"row ({row['what'][:60]})", f"{row['function']}: {type(error).__name__} {error}; correct its parameters")
     if row["unit"] != "text":
         if isinstance(value, str) or not isinstance(value, (int, float)):
@@ -268,6 +284,11 @@ def measure_row(kerf, row, function, path):
 
 
 def measure(order):
+    with contextlib.redirect_stdout(sys.stderr):  # what a reader's function prints is no part of the JSON
+        return json.dumps(measured(order))
+
+
+def measured(order):
     path = order["rows"] or str(ROWS)
     sources, rows, functions = load(path)
     if order["only"]:
@@ -282,11 +303,9 @@ def measure(order):
     with concurrent.futures.ThreadPoolExecutor(order["jobs"] or os.cpu_count()) as pool:
         made = list(pool.map(lambda row: measure_row(kerf, row, functions[row["function"]], path), rows))
     used = {row["source"] for row in made}
-    return json.dumps({"provenance": order["provenance"],
-                       "unexplained": sum(row["verdict"] == "miss" and not row["why"] for row in made),
-                       "sources": [source for source in sources.values() if source["name"] in used], "rows": made,
-                       "regions": kerf.regions() if order["plots"] else None,
-                       "energy": energy_panels(kerf) if order["plots"] else None})
+    return {"provenance": order["provenance"], "unexplained": sum(row["verdict"] == "miss" and not row["why"] for row in made),
+            "sources": [source for source in sources.values() if source["name"] in used], "rows": made,
+            "regions": kerf.regions() if order["plots"] else None, "energy": energy_panels(kerf) if order["plots"] else None}
 
 
 def energy_panels(kerf):

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cstddef>
 #include <filesystem>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <ostream>
 #include <string>
@@ -55,7 +55,14 @@ ReproduceCommand::ReproduceCommand(Arguments& program)
 int ReproduceCommand::probe(std::ostream& out) const {
   Json figures;
   if (probe_ != "devices") {
-    const std::string text{std::istreambuf_iterator<char>(std::cin), {}};
+    constexpr std::size_t kMostBytes = 65'536;
+    std::string text(kMostBytes + 1, '\0');
+    std::cin.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(std::cin.gcount()));
+    if (text.size() > kMostBytes) {
+      throw HilError(
+          "--probe: the standard input has more than 64 KiB; give such as {\"seconds\": 2}");
+    }
     try {
       figures = Json::parse(text);
       static_cast<void>(figures.members());
@@ -83,18 +90,18 @@ int ReproduceCommand::run(std::ostream& out) const {
     }
     return probe(out);
   }
-  const LabOutput as_report("--report", report_, ".json");
-  const LabOutput as_page("--page", page_, ".md");
-  const std::string regions = page_plot("--page", page_, ".regions.svg"),
-                    energy = page_plot("--page", page_, ".energy.svg");
-  const LabOutput as_regions("--page", regions, ".svg"), as_energy("--page", energy, ".svg");
-  LabOutput::check_distinct({&as_report, &as_page});
   if (!page_.empty()) {
     if (!rows_.empty() || !only_.empty()) {
       throw HilError("--page: is of all rows; leave --rows and --only out");
     }
     check_can_plot();
   }
+  const LabOutput as_report("--report", report_, ".json");
+  const LabOutput as_page("--page", page_, ".md");
+  const std::string regions = page_plot("--page", page_, ".regions.svg"),
+                    energy = page_plot("--page", page_, ".energy.svg");
+  const LabOutput as_regions("--page", regions, ".svg"), as_energy("--page", energy, ".svg");
+  LabOutput::check_distinct({&as_report, &as_page});
   const Json order{{"program", std::filesystem::read_symlink("/proc/self/exe").string()},
                    {"rows", rows_},
                    {"only", only_},

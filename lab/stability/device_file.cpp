@@ -46,7 +46,9 @@ DeviceDirection direction_of(const IdentifiedDevice& device, const std::string& 
       }
       given[count] = *number;
     }
-    const bool is_none = std::ranges::all_of(given, [](double part) { return part == 0; });
+    // Of the numbers that are taken the squares are, too: no part is lost, none is infinite.
+    const bool is_none =
+        std::ranges::all_of(given, [](double part) { return std::abs(part) < 1e-6; });
     if (count != given.size() || is_none) {
       throw HilError("--direction: " + text +
                      ": no direction of the device; give x, y, z, worst or such as 1,0,0.5");

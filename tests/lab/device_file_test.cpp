@@ -167,6 +167,7 @@ TEST_CASE("a file that is no device, and options against it, get one line") {
   for (const auto& [words, line] :
        {std::pair{"--direction z", "--direction: is that of a file"},
         std::pair{"--direction 0,0,0 --device FILE", "--direction: 0,0,0: no direction"},
+        std::pair{"--direction 1e-300,0,0 --device FILE", "--direction: 1e-300,0,0: no direction"},
         std::pair{"--direction up --device FILE", "--direction: up: no direction"},
         std::pair{"--arm --device FILE", "leave --arm out"},
         std::pair{"--rate 500,1000 --device FILE", "the map has one rate"},

@@ -97,6 +97,10 @@ class Reproduce(unittest.TestCase):
                 ({"source": '"b"'}, row + "source: b: no [[source]] has this name; add one"),
                 ({"source": ""}, row + "no source; give it"), ({"published": '"200"'}, row + "published: 200: is no number"),
                 ({"published": "true"}, row + "published: True: is no number"),
+                ({"published": "nan"}, row + "published: nan: is not finite"), ({"published": "-inf"}, row + "published: -inf: is not finite"),
+                ({"compare": '"within . %"'}, row + "compare: within . %: unknown"),
+                ({"compare": '"within a factor of 1.2.3"'}, row + "compare: within a factor of 1.2.3: unknown"),
+                ({"compare": '"within a factor of 0"'}, row + "compare: within a factor of 0: no number is within it"),
                 ({"compare": '"about"'}, row + "compare: about: unknown; give within N %"),
                 ({"compare": '"equal"'}, row + "compare: equal: texts are equal or not"),
                 ({"unknown": '"mass"'}, row + "compare: within 1 %: a source that leaves mass out"),
@@ -113,16 +117,26 @@ class Reproduce(unittest.TestCase):
         self.assertIn("rows: unknown; a file has", self.refusal("rows = 1\n" + SOURCE))
         self.assertIn("row: is no list of tables", self.refusal("row = 1\n" + SOURCE))
         self.assertIn("no TOML: ", self.refusal("[[row]\n"))
+        self.assertIn("is no regular file of at most 1 MiB", self.refusal("# " + "x" * (1 << 20)))
+        for path in ("/dev/zero", str(self.folder)):  # neither is read: one has no end
+            with self.assertRaisesRegex(text.BadInput, f"{path}: is no regular file of at most 1 MiB; name a file of rows"):
+                reproduce.load(path)
 
     def test_errors_of_the_command_have_one_line(self):
         self.rows.write_text(file_of(), encoding="utf-8")
         for words, complaint in [
                 (["--rows", str(self.folder / "none.toml")], "none.toml: No such file or directory; name a file of rows"),
                 (["--only", "nobody"], "--only: nobody: no source of "), (["--rows", str(self.rows), "--page", "p.md"], "--page: is of all rows"),
+                (["--rows", str(self.rows), "--page", str(self.folder / "p.md")], "--page: is of all rows"),
                 (["--probe", "devices", "--only", "a"], "--probe: measures one thing")]:
             code, out, err = lab(*words)
             self.assertEqual((code, out, err.count("\n")), (2, "", 1), words)
             self.assertIn(complaint, err)
+        self.assertFalse((self.folder / "plots").exists())  # a page that is refused makes none
+        with open("/dev/zero", encoding="utf-8") as endless:
+            made = subprocess.run([LAB, "reproduce", "--probe", "contact"], stdin=endless, capture_output=True, text=True, check=False, timeout=60)
+        self.assertEqual((made.returncode, made.stdout, made.stderr.count("\n")), (2, "", 1))
+        self.assertIn("--probe: the standard input has more than 64 KiB; give such as ", made.stderr)
         for name, given, complaint in [
                 ("contact", "[", "is no JSON object"), ("contact", '{"mass": 1}', "mass: unknown; known: mass_kg, "),
                 ("contact", '{"mass_kg": 0}', "mass_kg: 0 is outside of 0.001 to 100"), ("contact", '{"mass_kg": "1"}', "mass_kg: is no number"),
@@ -144,6 +158,25 @@ class Reproduce(unittest.TestCase):
         code, _, report = self.measured(file_of(head='functions = "mine.py"\n\n', function='"half_of_it"', published="100"))
         self.assertEqual((code, report["rows"][0]["verdict"]), (0, "match"))
         self.assertIn("mine.py: ", str(self.refusal_of_functions()))
+
+    def test_functions_of_a_reader_that_fail_have_one_line(self):
+        for name, content, complaint in [
+                ("mine.py", "1 / 0\n", "mine.py: ZeroDivisionError: "), ("mine.py", "import no_such\n", "mine.py: ModuleNotFoundError: "),
+                ("mine.py", "raise SystemExit(0)\n", "mine.py: SystemExit: 0; correct it"), ("mine.toml", "", "mine.toml: is no Python file"),
+                ("", "", ": is no Python file; "), ("mine.py", "def own(kerf):\n    return 1\n\nown.unit = 'furlong'\n", "gives furlong, an unknown unit"),
+                ("mine.py", "def own(kerf):\n    raise SystemExit(0)\n\nown.unit = 'N/m'\n", "own: SystemExit 0; correct"),
+                ("mine.py", "def own(kerf):\n    return kerf.no\n\nown.unit = 'N/m'\n", "own: AttributeError ")]:
+            if content:
+                (self.folder / name).write_text(content, encoding="utf-8")
+            self.rows.write_text(file_of(head=f'functions = "{name}"\n\n', function='"own"', parameters=""), encoding="utf-8")
+            code, out, err = lab("--rows", str(self.rows))
+            self.assertEqual((code, out, err.count("\n")), (2, "", 1), (content, err))
+            self.assertIn(complaint, err)
+        # What one prints is no part of the table, nor of the report.
+        (self.folder / "mine.py").write_text("print('begins')\n\ndef own(kerf):\n    print('runs')\n    return 200\n\nown.unit = 'N/m'\n", encoding="utf-8")
+        self.rows.write_text(file_of(head='functions = "mine.py"\n\n', function='"own"', parameters=""), encoding="utf-8")
+        code, out, _ = lab("--rows", str(self.rows))
+        self.assertEqual((code, "match (within 1 %)" in out, "runs" in out), (0, True, False))
 
     def refusal_of_functions(self):
         (self.folder / "mine.py").write_text("def (:\n", encoding="utf-8")
