@@ -18,6 +18,7 @@
 #include "lab/stability/axes.hpp"
 #include "lab/stability/device_file.hpp"
 #include "lab/stability/map.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/posix/report_tool.hpp"
 #include "shared/text/text.hpp"
 
@@ -188,6 +189,9 @@ SineResult ImpedanceCommand::row_at(double hz, const Spectrum& spectrum, const L
 int ImpedanceCommand::run(std::ostream& out) const {
   const LabOutput as_json("--json", json_, ".json"), as_plot("--plot", plot_, ".svg");
   LabOutput::check_distinct({&as_json, &as_plot});
+  if (!log_.empty()) {
+    check_outputs({log_}, {{"--json", json_, ".json"}, {"--plot", plot_, ".svg"}});
+  }
   if (!plot_.empty()) check_can_plot();
   std::optional<LoggedWall> log;
   if (!log_.empty()) log = read_logged_wall(log_);

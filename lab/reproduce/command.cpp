@@ -11,6 +11,7 @@
 #include "lab/reproduce/probes.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/posix/report_tool.hpp"
 #include "shared/text/json.hpp"
 
@@ -97,6 +98,7 @@ int ReproduceCommand::run(std::ostream& out) const {
     check_can_plot();
   }
   const LabOutput as_report("--report", report_, ".json");
+  if (!rows_.empty()) check_outputs({rows_}, {{"--report", report_, ".json"}});
   const LabOutput as_page("--page", page_, ".md");
   const std::string regions = page_plot("--page", page_, ".regions.svg"),
                     energy = page_plot("--page", page_, ".energy.svg");

@@ -240,8 +240,10 @@ TEST_CASE("the log of a hand that shakes in a wall has the impedance of the theo
     CHECK(std::abs(off.deg) < 1);
   }
   CHECK(measured_rows >= 8);
+  const std::string into_the_log = "--json " + (folder / "log/scene.json").string();
   for (const auto& [words, line] :
        {std::pair{"--stiffness 1", "--stiffness: the recording has its own"},
+        std::pair{into_the_log.c_str(), "would lie among the files of "},
         std::pair{"--rate 500", "--rate: the scene of the recording has it"}}) {
     const LabAnswer wrong = lab("impedance --log " + (folder / "log").string() + " " + words);
     CAPTURE(wrong.err);

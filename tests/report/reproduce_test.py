@@ -132,6 +132,11 @@ class Reproduce(unittest.TestCase):
             code, out, err = lab(*words)
             self.assertEqual((code, out, err.count("\n")), (2, "", 1), words)
             self.assertIn(complaint, err)
+        rows = self.folder / "rows.json"
+        rows.write_text(file_of(), encoding="utf-8")
+        code, _, err = lab("--rows", str(rows), "--report", str(rows))
+        self.assertEqual((code, rows.read_text(encoding="utf-8")), (2, file_of()))
+        self.assertIn("rows.json: is a file of this run itself, which would be lost; give --report another name", err)
         self.assertFalse((self.folder / "plots").exists())  # a page that is refused makes none
         with open("/dev/zero", encoding="utf-8") as endless:
             made = subprocess.run([LAB, "reproduce", "--probe", "contact"], stdin=endless, capture_output=True, text=True, check=False, timeout=60)
