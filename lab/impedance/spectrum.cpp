@@ -90,7 +90,6 @@ std::string text_of(const Spectrum& spectrum) {
   Deviation most;
   for (const SineResult& row : spectrum.rows) {
     const Impedance theory = spectrum.wall_by_theory(row);
-    const Impedance port = spectrum.port_measured(row).value_or(spectrum.port_by_theory(row));
     text += format("%-8.4g %10.4g%10.3g ", row.hz, felt_stiffness(theory, row.hz), theory.real());
     if (row.wall) {
       const Deviation off = deviation(*row.wall, theory);
@@ -98,10 +97,11 @@ std::string text_of(const Spectrum& spectrum) {
       most.deg = std::max(most.deg, std::abs(off.deg));
       text += format("%10.4g%10.3g %9.2f%8.2f", felt_stiffness(*row.wall, row.hz), row.wall->real(),
                      100 * off.ratio, off.deg);
-    } else {
-      text += format("%38s", spectrum.unmeasured.c_str());
+      const Impedance port = *spectrum.port_measured(row);
+      text += format(" %11.4g%10.3g\n", felt_stiffness(port, row.hz), port.real());
+    } else {  // Coulomb friction depends on a motion that there is not
+      text += format("%38s %11s%10s\n", spectrum.unmeasured.c_str(), "-", "-");
     }
-    text += format(" %11.4g%10.3g\n", felt_stiffness(port, row.hz), port.real());
   }
   text += format("furthest from theory: %.2f %%, %.2f deg", 100 * most.ratio, most.deg);
   text += spectrum.theory_holds() ? "\n"

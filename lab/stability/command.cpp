@@ -177,7 +177,10 @@ ZwidthCommand::ZwidthCommand(Arguments& program)
   app_.option("--stiffness", stiffness_,
               "of the wall, K: from:to:count, even in their ratio [0.05:50:40]")
       .shown_as("N/mm");
-  app_.option("--map", map_, "the two axes of the picture").shown_as("X,Y").shows_default();
+  app_.option("--map", map_,
+              "the two axes of the picture; damping on it is 0:0.03:40 unless it is given")
+      .shown_as("X,Y")
+      .shows_default();
   app_.flag("--quick", quick_, "a small map of both loops, in seconds");
   app_.flag("--arm", arm_, "the whole servo step with an emulated device in place of one axis");
   app_.option(
