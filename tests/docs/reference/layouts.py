@@ -17,14 +17,16 @@ MEANINGS = {
     "bricks_y": "along y", "bricks_z": "along z", "brick_count": "of them in all", "spacing_mm": "of voxels, along x, y, z",
     "origin_mm": "centre of voxel (0, 0, 0) in the world", "off_versions": "of the version words", "off_bricks": "of the densities",
     "material": "not used: 0", "iso": "density of the surface, 0 to 65535", "seq": "as of a `TickRecord`", "tick": "of the servo",
-    "lo": "first voxel of the box", "volume": "which one, from 0", "cause": "above", "magic": "above", "protocol": "version of the talk",
-    "session": "of the run", "flags": "above", "build_id": "for messages only", "heartbeat_ns": "of the last finished tick",
-    "blocks": "how many follow", "raw_bytes": "of the payload, before it was packed", "payload_bytes": "as it follows",
-    "ring": "0 ticks, 1 dirty", "count": "records", "first": "index of the first record", "stride": "from one index to the next",
-    "sent_ns": "when it was sent", "frame": "1, 2, ...; the frame that was applied", "argument": "of the command, above"}
-SAID = {"set_hash": "sum over all that the viewer holds after this frame (`bridge/wire/messages.hpp`)",
-        "record_bytes": "size of a `TickRecord`", "dirty_bytes": "size of a `DirtyRecord`", "status": "above",
-        "index": "of the command, as `last_command` will show it", "kind": "above", "hi": "end of the box: it does not belong to it",
+    "lo": "first voxel of the box", "volume": "which one, from 0", "cause": "above", "magic": "above",
+    "session": "session of the run", "flags": "listed above", "build_id": "for messages only", "heartbeat_ns": "of the last finished tick",
+    "blocks": "number of blocks that follow", "raw_bytes": "length of the payload before it was packed",
+    "payload_bytes": "length of the payload as sent", "ring": "0 ticks, 1 dirty, 2 ticks of two arms", "count": "number of records",
+    "first": "index of the first record", "stride": "difference between two indices", "sent_ns": "time when the frame was sent",
+    "frame": "number of the frame that was applied", "argument": "argument of the command, listed above"}
+SAID = {"set_hash": "sum over all blocks that the viewer has after this frame, above",
+        "record_bytes": "size of a `TickRecord`", "dirty_bytes": "size of a `DirtyRecord`", "status": "listed above",
+        "index": "index of the command, which `last_command` will show", "kind": "listed above",
+        "hi": "end of the box: it does not belong to it",
         "removed": "density units taken away; by an undo: given back"}
 
 

@@ -42,34 +42,44 @@ def omni(root):
 
 {drawing(file, 'namespace kerf {')}
 
-Bytes that are not listed are written as zero and ignored when read. The words that have a value here have it in every
-packet, and a packet with another one is refused. `on` is bit 3 of the word at 6, `lights` its two lowest bits: 0 off, 1 flashes slowly, 2 fast, 3 steady. Of the byte at
-19: 1 button 1, 2 button 2, 4 inkwell; each is 0 while it is pressed or docked.
+Bytes that are not listed are sent as zero and ignored when read. A word that has a value in this table has that value in every
+packet. A packet with another value is refused.
 
-**Speaks first**: the device. It streams by its own clock (in lock-step it sends its first report unasked).
+* Host word at 6: `on` is bit 3 and switches the motors on. `lights` is the two lowest bits: 0 off, 1 flashes slowly, 2 flashes
+  fast, 3 steady.
+* Device byte at 19: bit 0 is button 1, bit 1 is button 2, bit 2 is the inkwell. A bit is 0 if the button is pressed or the
+  stylus is docked.
 
-**Packet counter**: one more in each packet. kerf takes a packet whose counter is 1 to 160 ahead of the last one. Up to 16,000
-ahead it waits for a second packet that continues it. Any other packet is old: refused until nothing newer has come for 160
-ticks, by when the motors are off.
+**Speaks first**: the device. It streams at the rate of its clock. In lock-step it sends its first report before any command.
 
-**Counts to joints**, in rad, c = 2 pi / {number('kCountsPerRev')}; `dock` is the count in the inkwell. q1 is the turret, to the left; q2 the
-thigh above the horizontal; q3 the forearm from straight down, outwards. All three are against the base.
+**Packet counter**: increases by 1 in each packet. kerf compares it with the newest packet that it accepted:
+
+* 1 to 160 ahead: accepted.
+* 161 to 16,000 ahead: refused. A second packet, 1 to 160 ahead of the refused one, is accepted.
+* Any other counter is that of an old packet: refused. After 160 ticks without an accepted packet, when the motors are off, a
+  second packet that is 1 to 160 ahead of the refused one is accepted.
+
+**Counts to joints**, in rad, with c = 2 pi / {number('kCountsPerRev')}. `dock` is the count in the inkwell. q1 turns the turret to the left. q2 is the
+angle of the thigh above the horizontal. q3 is the angle of the forearm from straight down, outwards. All three angles are
+relative to the base.
 
 {joints}
 
-**Joints to tip**, the centre of the gimbal, and **force to torques** in N mm. L1 = L2 = {plain(number('kUpperLinkMm'))}, Cy = {plain(number('kOriginHeightMm'))}, Cz = {plain(number('kOriginDepthMm'))}; in
-the inkwell the tip is at (0, {height:.1f}, {at_dock - number('kOriginDepthMm'):.1f}).
+**Joints to tip and force to torques**: the tip is the centre of the gimbal; torques are in N mm. L1 = L2 = {plain(number('kUpperLinkMm'))} mm,
+Cy = {plain(number('kOriginHeightMm'))} mm, Cz = {plain(number('kOriginDepthMm'))} mm. In the inkwell the tip is at (0, {height:.1f}, {at_dock - number('kOriginDepthMm'):.1f}).
 
 {serial_arm()}
 
-**Torques to motors**: the word is {number('kMotorZero'):#x} + t / torque scale, 0 to {number('kMotorWordMax'):#x}. A positive count raises its q. The emulated
-device has 0.342 N mm per count.
+**Torques to motors**: the motor word is {number('kMotorZero'):#x} + t / torque scale, clamped to 0 to {number('kMotorWordMax'):#x}. A positive count increases q of its joint.
+The torque scale of the emulated device is 0.342 N mm per count.
 
 **Gimbal**, in rad: {gimbal}. The lowest {number('kPotNoiseBits')} bits
-are noise. The stylus is turned by Ry(-q1) Rx(-q3) Ry(-yaw) Rx(pitch) Ry(roll); untwisted its shaft points up.
+of A and B are noise. The orientation of the stylus is Ry(-q1) Rx(-q3) Ry(-yaw) Rx(pitch) Ry(roll). At identity its shaft points
+up.
 
-**Calibration**: in the inkwell, for 50 ms, no count moves by more than 2. kerf then sets the light to steady. The emulated
-hand takes the stylus 50 ms after it sees that light, or motors that are on, at the latest after 2 s.
+**Calibration**: kerf calibrates when the stylus is in the inkwell and no count has moved by more than 2 for 50 ms. kerf then
+sets the light to steady. The emulated hand picks up the stylus 50 ms after the light is steady or the motors are on. If neither
+happens, the hand picks up the stylus 2 s after the host's first packet.
 """
 
 
@@ -81,16 +91,17 @@ def falcon(root):
     azimuths = ", ".join(plain(one) for one in file.numbers("kLegAzimuthRad"))
     return f"""## Falcon
 
-Serial, in packets of {number('kPacketBytes')} printable bytes; `shared/wire/falcon.hpp` has the way there over USB.
+A serial stream of packets of {number('kPacketBytes')} printable bytes. How a host opens it over USB is in `shared/wire/falcon.hpp`.
 
 {drawing(file, 'namespace kerf {')}
 
-A report with other bytes in these places is refused. The host's numbers are motor torques, up to +-{number('kMotorCountMax')}; the device's are encoder counts.
+A report with any other byte in one of these places is refused. The numbers of the host are motor torques in counts, up to
++-{number('kMotorCountMax')}. The numbers of the device are encoder counts.
 
-**Speaks first**: the host, with a packet without torque. Host and device take turns: one answer to each packet.
+**Speaks first**: the host, with a packet without torque. The device answers each packet of the host with one report.
 
-**Counts to joints**: t1 of a leg is {plain(file.numbers('kZeroRad')[0])} degrees + 2 pi count / ({number('kShaftCountsPerRev')} * {plain(number('kThighWheelMm'))} / {plain(number('kShaftMm'))}) once homed; a larger t1 moves the grip
-to the user. Before that counts begin at 0 at power-up and jump when the leg is homed.
+**Counts to joints**: t1 is the angle of a leg's thigh. Once the leg is homed, t1 = {plain(file.numbers('kZeroRad')[0])} degrees + 2 pi count / ({number('kShaftCountsPerRev')} * {plain(number('kThighWheelMm'))} / {plain(number('kShaftMm'))}).
+A larger t1 moves the grip towards the user. Counts start at 0 at power-up and jump when the leg is homed.
 
 **Tip to joints**, for the leg at the azimuth phi = {azimuths} degrees (about z, from x to y), in mm: a = {plain(number('kThighMm'))},
 b = {plain(number('kShinMm'))}, c = {plain(number('kPlateOutMm'))}, d = {plain(number('kShinEndMm'))}, e = {plain(number('kKneeEndMm'))}, f = {plain(number('kPlateAcrossMm'))}, r = {plain(number('kHipOutMm'))}, s = {plain(number('kHipAcrossMm'))}.
@@ -98,15 +109,18 @@ b = {plain(number('kShinMm'))}, c = {plain(number('kPlateOutMm'))}, d = {plain(n
     u = cos phi x + sin phi y - r + c        v = cos phi y - sin phi x - s + f        w = z + {plain(number('kOriginDepthMm'))}
     L = d + e + sqrt(b^2 - v^2)              (u - a cos t1)^2 + (w - a sin t1)^2 = L^2
 
-With E = -2 a u, F = -2 a w, G = u^2 + w^2 + a^2 - L^2 that is t1 = 2 atan2(G + E, sqrt(E^2 + F^2 - G^2) - F). The tip from
-the joints is the solution of all three; Newton's steps from (0, 0, 0) reach it everywhere within {plain(number('kReachMm'))} mm.
+With E = -2 a u, F = -2 a w, G = u^2 + w^2 + a^2 - L^2 the solution is t1 = 2 atan2(G + E, sqrt(E^2 + F^2 - G^2) - F). The tip
+follows from the joints as the common solution of the equations of the three legs. Newton's method from (0, 0, 0) converges to
+every tip within {plain(number('kReachMm'))} mm of the origin.
 
-**Force and torques**: F = SUM t_i (d t1_i / d tip), t_i the torque of leg i in N mm. **A positive count is a negative torque**:
-count = -t / torque scale. The emulated device has {plain(number('kOpenDriverNmmPerCount'))} N mm per count.
+**Force and torques**: F = SUM t_i (d t1_i / d tip), where t_i is the torque of leg i in N mm. **A positive count is a negative
+torque**: count = -t / torque scale. The torque scale of the emulated device is {plain(number('kOpenDriverNmmPerCount'))} N mm per count.
 
-**Homing**: while a bit of 16, 32, 64 is missing, the host sets bit 1 in every packet, and the user pulls the grip out (t1 above
-40 degrees in the emulator) and pushes it in (below 18). **Calibration** of kerf: the centre button, held for 50 ms at rest;
-released, the force starts.
+**Homing**: the host sends homing (1) in every packet until the device reports 16, 32 and 64. The user pulls the grip out and
+then pushes it in; the emulator needs t1 above 40 degrees, then below 18 degrees.
+
+**Calibration**: kerf calibrates when the centre button has been held for 50 ms with the grip at rest. The force starts when the
+button is released.
 """
 
 
@@ -117,28 +131,30 @@ def wooden(root):
     bodies = [plain(one) for one in file.numbers("kBodyMm")]
     return f"""## WoodenHaptics
 
-HID reports, 14 bytes or the first 14 of 64, seven i16; the host answers in the length that the device has:
+HID reports of 14 bytes, or of 64 bytes of which the first 14 are used: seven i16. The host sends packets of the same length as
+the device:
 
 {drawing(file, 'namespace kerf {')}
 
-A report of another length than the first one, or with another word at 12 than 0 or 1, is refused.
+A report is refused if its length differs from the first report's, or if the word at 12 is neither 0 nor 1.
 
-**Speaks first**: the host, with currents of 0. From then on the device reports every 1 ms; after {plain(number('kWatchdogS'))} s without a packet
-it switches its amplifiers off.
+**Speaks first**: the host, with currents of 0. From then on the device reports every 1 ms. After {plain(number('kWatchdogS'))} s without a packet from the
+host the device switches its amplifiers off.
 
-**Counts to joints**, in rad: angle = 2 pi / {number('kCountsPerRev')} ({plain(number('kCapstanMm'))} / D) count, D = {', '.join(bodies)} for A, B, C. A turns the
-arm to the right, B leans the upper link out from the vertical, C lifts the forearm from straight down, outwards. With
+**Counts to joints**, in rad: angle = 2 pi / {number('kCountsPerRev')} ({plain(number('kCapstanMm'))} / D) count, with D = {', '.join(bodies)} for A, B, C. A turns the
+arm to the right. B leans the upper link out from the vertical. C lifts the forearm outwards from straight down. With
 
     q1 = -A        q2 = pi/2 - B        q3 = C
 
-the formulas of the Omni hold for tip and torques: L1 = {plain(number('kUpperLinkMm'))}, L2 = {plain(number('kForearmMm'))}, Cy = {plain(number('kShoulderHeightMm') - number('kOriginHeightMm'))}, Cz = {plain(number('kOriginDepthMm'))}.
+the [Omni's formulas](#omni) for tip and torques apply, with L1 = {plain(number('kUpperLinkMm'))} mm, L2 = {plain(number('kForearmMm'))} mm, Cy = {plain(number('kShoulderHeightMm') - number('kOriginHeightMm'))}, Cz = {plain(number('kOriginDepthMm'))} mm.
 
-**Torques to motors**: current = torque / torque scale in mA, up to +-{number('kMaxMilliamps')}; a positive one raises the count: the
-torques of A, B, C are -t1, -t2, t3. The emulated device has 0.4144, 0.3108, 0.3108 N mm per mA. `encoder_sign` -1 reverses count and motor.
+**Torques to motors**: current in mA = torque / torque scale, up to +-{number('kMaxMilliamps')}. The torques of A, B, C are -t1, -t2, t3. A positive
+current increases the count. The torque scales of the emulated device are 0.4144, 0.3108, 0.3108 N mm per mA. `encoder_sign` -1
+reverses the counts and the motor of a joint.
 
-**Calibration**: in the home pose (A = B = 0, C = pi/2) the user presses the button; the word at 12 stays 1 until the host sets the
-encoders. kerf sets them to {home}, 0, 0, 0, without current, and takes the arm for parked until a joint is more than 40
-counts from there.
+**Calibration**: the user holds the home pose (A = B = 0, C = pi/2) and presses the button. The word at 12 stays 1 until the host
+sets the encoders. kerf sets them to {home}, 0, 0, 0, with zero current. The arm counts as parked until a joint is more
+than 40 counts from these values.
 """
 
 
@@ -162,23 +178,33 @@ def cartesian(root):
     table = "\n".join(rows)
     return f"""## Cartesian devices: inverse3, touch, omega
 
-What the vendors' services and libraries say is translated into these packets of kerf's own; the emulator serves them directly
-at `--front socket` and `udp`.
+A Cartesian device reports a pose and takes a force through its vendor's service or library. `kerf-arm` translates between the
+vendor's interface and the packets below, which are kerf's. The emulator sends and reads these packets directly at
+`--front socket` and `udp`.
 
 {drawing(file, 'namespace kerf {')}
 
-The orientation is that of the tool: identity is a shaft that points up. A position of more than {number('kFarthestUm') // 1000} mm on an axis, or an orientation
-whose length is not 1 within 1 %, makes the packet none. The force at 28 is what the sender knows: the emulator's is the one that its
-motors give; `kerf-arm`'s the one that it gave the library in the frame before, whatever the device made of it; the Inverse3's what
-the service reports since 3.5, and 0 before.
+The orientation is the tool's: at identity the shaft points up. kerf refuses a packet whose position is more than {number('kFarthestUm') // 1000} mm on an axis,
+or whose orientation has a length that differs from 1 by more than 1 %. The force at 28 depends on the sender:
 
-| device | step of the servo, um | resolution, um | orientation | parked | workspace of the emulated one, mm | peak N, continuous N, N/ms |
+* the emulator sends the force that its motors exert;
+* `kerf-arm` sends the force that it passed to the vendor's library in the previous frame, which the device may not have exerted;
+* `kerf-arm` for the Inverse3 sends the force that the service reports since version 3.5, and 0 with older versions.
+
+| device | one count of the servo, um | resolution, um | reports orientation | parked | workspace of the emulated device, mm | peak N, continuous N, slew N/ms |
 |---|---|---|---|---|---|---|
 {table}
 
-**Speaks first**: the device. **Number**: as the Omni's packet counter. **Force**: it counts while the byte at 10 is 1; the device
-clamps it to its peak. **Torque scale**: the true force over the commanded one along x, y, z: 1.
-**Calibration**: parked, homed and powered for 50 ms while no axis moves by more than two steps of the resolution.
+**Speaks first**: the device.
+
+**Number**: the number at 4 follows the rules of the Omni's packet counter.
+
+**Force**: the device exerts the force only while the byte at 10 is 1, and clamps the force to its peak.
+
+**Torque scale**: the ratio of true force to commanded force along x, y, z; 1 for the emulated devices.
+
+**Calibration**: kerf calibrates when the device has been parked, homed and powered for 50 ms and no axis has moved by more than
+two steps of its resolution.
 """
 
 
@@ -190,62 +216,73 @@ def inverse3(root):
     faults = re.findall(r'"([^"]+)"', re.search(r"kServiceFaultWords\{([^}]*)\}", device.text)[1])
     return f"""## The Inverse3's service
 
-`kerf-arm --device inverse3` and `--front websocket`: JSON as text over a WebSocket at port {file.number('kServicePort')}, and events at {file.number('kEventPort')}. The words are those of
-the vendor's public pages; the emulated service has the members that kerf reads, and some more.
+`kerf-arm --device inverse3` talks to the vendor's service, or to the emulator at `--front websocket`: JSON text over a WebSocket at
+port {file.number('kServicePort')}, and events at port {file.number('kEventPort')}. Member names are from the vendor's public documentation. The emulated service has the members that kerf
+reads, and some others.
 
-* **Speaks first**: the service, with the list of its devices and their configuration. Then each message of the client has one
-  reply, and nothing else comes. In lock-step a message is one period of the servo.
-* **Force**, N: `{{"inverse3": [{{"device_id": "0A1C", "commands": {{"set_cursor_force": {{"vector": {{"x": 0, "y": -0.4, "z": 1.1}}}}}}}}]}}`;
-  `values` in place of `vector` before 3.5. It lasts one message.
-* **Frame**: X right, Y away from the user, Z up, m. kerf has x = X, y = Z, z = -Y, about ({origin}) m of the service, a choice of ours.
-* **Emulated**: versions {", ".join(f"`{word}`" for word in profiles)} (`--profile`); `GET /version`, `/devices`, `/settings/devices/force_scale`. The answer
-  to `/version` has a member `kerf_emulator`, by which `kerf-arm` sees whether it runs in lock-step. Faults (`--bus-fault`):
-  {", ".join(f"`{word}`" for word in faults)}.
+* **Speaks first**: the service, with the list of its devices and their configuration. After that it sends exactly one reply to
+  each message of the client. In lock-step one message is one period of the servo.
+* **Force**, in N: `{{"inverse3": [{{"device_id": "0A1C", "commands": {{"set_cursor_force": {{"vector": {{"x": 0, "y": -0.4, "z": 1.1}}}}}}}}]}}`.
+  Before 3.5 the member is `values` instead of `vector`. A force stays until the next message. A message without a force for the
+  device sets the force to 0.
+* **Frame**, in m: X right, Y away from the user, Z up. kerf's frame has x = X, y = Z, z = -Y and its origin at
+  ({origin}) m of the service's frame. The origin is kerf's choice.
+* **Emulated versions** (`--profile`): {", ".join(f"`{word}`" for word in profiles)}.
+* **HTTP**: `GET /version`, `/devices`, `/settings/devices/force_scale`. The emulator's reply to `/version` has a member
+  `kerf_emulator`, from which `kerf-arm` reads whether the emulator runs in lock-step.
+* **Faults** (`--bus-fault`): {", ".join(f"`{word}`" for word in faults)}.
 """
 
 
 def links(root):
     link = Source(root, "shared/wire/emulator_link.hpp")
+    devices = re.findall(r'\.word = "(\w+)"', Source(root, "shared/wire/personality.hpp").text)
 
     def magic(name):
         marks = re.search(rf"{name}\{{([^}}]*)\}}", link.text)[1]
         return " ".join(mark.strip("'") for mark in marks.split(", "))
     return f"""## kerf's own links
 
-Between the controller (`--port`) and an emulator, on a Unix socket of the kind SOCK_SEQPACKET, or over UDP. **One message is
-one packet** of the device, as above, without anything around it. The emulator listens, and the controller connects.
+The controller (`--port`) and an emulator communicate over a Unix socket of type SOCK_SEQPACKET, or over UDP. **One message is
+one packet** of the device as listed above, with no header or trailer. The emulator listens; the controller connects.
 
-1. **Hello.** The controller sends one first, and over UDP again every 200 ms, until the emulator answers with its own; in
-   lock-step, if the two fit, that is the same 20 bytes. What the device sends before the answer is dropped. Another device,
-   lock-step on one side only, or in lock-step another rate: the emulator answers all the same, then it ends the link. A host
-   that sends no hello is served too.
-2. **Who speaks first** then stands with each device: an Omni's first report follows the answer.
-3. **In real time** each side sends by its own clock and reads the newest. **In lock-step** the device sends one packet for
-   each packet of the host: its state one tick later. Both wait for each other, never for a clock, so a device that has
-   nothing to send in a tick sends a turn without packets. A turn with packets says the same as these packets; the emulator
-   sends turns only if it plays faults, and the host sends none.
-4. **End.** The last packet of a host switches the motors off. On a socket, close it. Over UDP an empty datagram is the
-   goodbye (as the first one of a host it does nothing); 2 s of silence of the host end the link too. **A device** ends the
-   link by `shutdown(SHUT_WR)`, an empty packet or `close`, over UDP by an empty datagram. kerf reads no more then. Its
-   next packet, at most a tick later, switches the motors off, as does each one until it closes its side 2 s later.
+1. **Hello.** The controller sends the first hello, and over UDP repeats it every 200 ms until the emulator answers with a hello.
+   In lock-step the two hellos are equal if the settings fit. The controller drops all packets that the device sends before
+   the answer. If the devices differ, if only one side runs in lock-step, or if the rates differ in lock-step, the emulator
+   answers and then ends the link. The emulator also serves a host that sends no hello.
+2. **First packet.** After the hellos, the side that "speaks first" above sends its packet. An Omni's first report follows the
+   emulator's hello.
+3. **In real time** each side sends at the rate of its clock and reads the newest packet.
+4. **In lock-step** the device sends one packet for each packet of the host: its state one tick later. Each side waits for the
+   other, never for a clock. A device that has nothing to send in a tick therefore sends a turn (see the table) without
+   packets. A turn that contains packets means the same as these packets sent one by one. The emulator sends turns only if it
+   plays a script of faults. The host sends no turns.
+5. **End by the host.** The last packet of the host switches the motors off. Then the host closes the socket, or sends an empty
+   datagram over UDP. An empty datagram has no effect as the host's first datagram. Over UDP, 2 s without a datagram from the
+   host also end the link.
+6. **End by the device.** The device calls `shutdown(SHUT_WR)` or `close`, or sends an empty packet; over UDP it sends an empty
+   datagram. The controller then reads no more. From the next tick on, each packet that it sends switches the motors off. It
+   closes its side 2 s later.
 
-| packet | byte | type | what |
+| packet | byte | type | meaning |
 |---|---|---|---|
-| hello, {link.number('kHelloBytes')} bytes | 0 | u8 x 8 | `{magic('kHelloMagic')}`: the letters as ASCII, then the numbers 0 and 1 as one byte each; the last one is the version |
-| | 8 | u8 | device: 0 omni, 1 falcon, 2 woodenhaptics |
-| | 9 | u8 | 1: lock-step |
-| | 12 | u32 | rate of the servo in Hz; of an emulator in real time that of its packets; 10, 11 and 16 to 19 are 0 |
+| hello, {link.number('kHelloBytes')} bytes | 0 | u8 x 8 | `{magic('kHelloMagic')}`: letters in ASCII; 0 and 1 are numbers, one byte each; the last byte is the version |
+| | 8 | u8 | device: {", ".join(f"{i} {word}" for i, word in enumerate(devices))} |
+| | 9 | u8 | 1 in lock-step, else 0 |
+| | 12 | u32 | rate of the servo in Hz; from an emulator in real time, the rate of its packets |
+| | 10, 11, 16 to 19 | u8 | 0 |
 | turn, at most {link.number('kMostBytes')} bytes | 0 | u8 x 8 | `{magic('kMagic')}` |
-| | 8 | | each packet behind a u8 with its length; none: nothing came |
+| | 8 | | for each packet, a u8 with its length, then its bytes |
 | target, {link.number('kHandTargetBytes')} bytes | 0 | u8 x 8 | `{magic('kHandTargetMagic')}` |
-| | 8 | i32 x 3 | place in um, in the device's frame, each up to {link.number('kMaxTargetMm'):g} mm |
+| | 8 | i32 x 3 | position in um, in the device's frame, each up to {link.number('kMaxTargetMm'):g} mm |
 | | 20 | i32 x 3 | yaw, pitch, roll in urad, each up to 60 degrees |
-| | 32 | u8 | 1 button 1, 2 button 2, 4 park |
-| greeting, 9 bytes | 0 | u8 x 8 | that of the target; the emulator says it first |
-| | 8 | u8 | 0: the hand is yours; 1: it is taken, and the connection is closed |
+| | 32 | u8 | sum of 1 for button 1, 2 for button 2, 4 for park |
+| | 33 | u8 x 3 | 0 |
+| greeting, 9 bytes | 0 | u8 x 8 | the same 8 bytes as a target |
+| | 8 | u8 | 0: the client leads the hand; 1: another client leads it, and the emulator closes the connection |
 
-A window that leads the hand connects to the emulator's `--hand-socket`, reads the greeting, and sends a target in each
-picture. A hello for an Omni in lock-step at 1000 Hz, by Python's `struct`: `pack("<8s2B2xI4x", b"kerf\\0hi\\1", 0, 1, 1000)`.
+A window that leads the emulated hand connects to the emulator's `--hand-socket`, reads the greeting, and sends one target in each
+picture. A hello for an Omni in lock-step at 1000 Hz, in Python with `struct`: `pack("<8s2B2xI4x", b"kerf\\0hi\\1", 0, 1, 1000)`.
 """
 
 
@@ -264,48 +301,55 @@ def bridge(root):
             name, size = structs[kind], re.search(rf"sizeof\({structs[kind]}\) == (\d+)", file.text)[1]
             if not name.startswith(kind.removeprefix("k")) or file.struct(name)[1] != int(size):
                 raise Lack(f"{file.path}: {name} is not what its magic or its size says")
-            rows = struct_table(file, name).replace("where the run stands, above", "where the run stands ([segment](api.md#the-shared-memory))")
+            rows = struct_table(file, name).replace("where the run stands, above", "state of the run ([segment](api.md#the-shared-memory))")
+            rows = rows.replace("| u32 | above |", f"| u32 | `{mark}` |", 1)
             yield f"### `{name}`, `{mark}`\n\n{rows}\n"
-    kinds = ", ".join(f'{value} `{word}` ({comment.removeprefix("argument: ")})'
-                      for word, value, comment in command.enumerators("CommandKind"))
+    kinds = "\n".join(f'    * {value} `{word}`. {comment[0].upper()}{comment[1:]}' for word, value, comment in command.enumerators("CommandKind"))
     replies = ", ".join(f"{value} `{word}` ({comment})" for word, value, comment in command.enumerators("ReplyStatus"))
     hashing = re.search(r"constexpr std::uint64_t block_hash\([^{]*\{(.*?)\n\}", file.text, re.S)[1]
     steps = [line.strip().removesuffix(";").removeprefix("std::uint64_t ") for line in hashing.strip().splitlines()]
     return f"""## Bridge
 
-A WebSocket at `ws://HOST:PORT{path}?token=TOKEN`, `wss://` off loopback, protocol {file.number('kProtocol')}. `kerf-bridge serve` prints host, port
-and token.
+A WebSocket at `ws://HOST:PORT{path}?token=TOKEN`, protocol {file.number('kProtocol')}; `wss://` unless HOST is the loopback. `kerf-bridge serve` prints host,
+port and token.
 
-* `Host:` is an address of the server, `localhost` or a name that `serve` was told: else 421. `Origin:` is left out, or has the
-  scheme and host of the request: else 403. A wrong token is answered after 1 s. A browser has a cookie in the token's place.
-* Each message is one binary WebSocket message: to the viewer at most {most_kib} KiB, to the server at most {file.number('kMaxUpBytes')} bytes. The magic
-  is its first four characters. Times are the server's CLOCK_MONOTONIC.
-* **Packed** means: the payload is one block of LZ4 (the block format, without a frame around it), `payload_bytes` long, of which
-  `raw_bytes` come out: `lz4.block.decompress(payload, uncompressed_size=raw_bytes)` in Python. Else both lengths are equal.
+* The header `Host` must be an IP address, `localhost`, a name of the server's machine, or the name in `--public-url`. Any other
+  host gets 421.
+* The header `Origin` must be absent, have the scheme and host of the request, or be that of `--public-url`. Any other origin gets 403.
+* The reply to a wrong token comes after 1 s. A browser sends a cookie instead of the token.
+* Each message is one binary WebSocket message: at most {most_kib} KiB to the viewer, at most {file.number('kMaxUpBytes')} bytes to the server. The magic is the first
+  four characters of the message. Times are CLOCK_MONOTONIC of the server.
+* A **packed** payload is one LZ4 block (block format, without an LZ4 frame) of `payload_bytes`. It unpacks to `raw_bytes`. In Python:
+  `lz4.block.decompress(payload, uncompressed_size=raw_bytes)`. If a payload is not packed, both lengths are equal.
+* A **pass** is the changes between two snapshots of the volumes, sent in one or more frames.
 
-The server says hello first, and again for a new run; then frames, records, replies and views. The viewer sends an
-acknowledgement for each frame that it has applied, commands, and its view where it presents it. What follows a head:
+The server sends a hello first, and another hello for each new run. After a hello it sends frames, records, replies and views. The
+viewer sends an acknowledgement for each frame that it has applied, commands, and its view while it presents. Each message
+begins with a head, which has a table below. The head's flags and values, and the data after the head, are:
 
-* hello: the volumes' `VolumeDescriptor` ([segment](api.md#the-shared-memory)). `off_labels` is 1 where there are labels; the other
-  offsets are 0. Flags: {file.number('kMayCommand')} this viewer may send commands, {file.number('kTwoArms')} the run has two arms.
-* frame: u64 version for each block, u32 number for each block, then the payload: the blocks. Flags: {file.number('kPacked')} packed,
-  {file.number('kLastOfPass')} last of a pass (the volumes are then those of `tick`), {file.number('kRunEnded')} the controller has gone.
-  Blocks are numbered: first the scene's text, {file.number('kTextBlockBytes')} bytes each; then the bricks' densities, {file.number('kDensityBlockBytes')} bytes each, of
-  one volume after the other; then the bricks' labels, {file.number('kLabelBlockBytes')} bytes each.
-* records: `count` records of `ring` 0 (ticks) or 1 (dirty) as they lie in the segment; number i has the index
-  `first + i * stride`. Flag {file.number('kPacked')}: packed. A run of two arms has `ring` 2 in place of 0: each is the first arm's
-  record of a tick and, behind it, the second's.
-* command: `kind` {kinds}.
-* view: of a viewer with the right to command, up to 60 a second, and to all viewers when it changes. One presents; another one gets
-  the view of the first. A view that is not finite, beyond 1e5, with the eye at its target or up along the view is left out.
+* hello: a `VolumeDescriptor` ([segment](api.md#the-shared-memory)) for each volume. `off_labels` is 1 if the volume has labels. The
+  other offsets are 0. Flags: {file.number('kMayCommand')} this viewer may send commands, {file.number('kTwoArms')} the run has two arms.
+* frame: a u64 version for each block, a u32 number for each block, then the payload, which is the blocks. Flags: {file.number('kPacked')} packed,
+  {file.number('kLastOfPass')} last of a pass (the viewer then has the volumes of `tick`), {file.number('kRunEnded')} the controller has gone.
+  Blocks are numbered from 0: first the scene's text in blocks of {file.number('kTextBlockBytes')} bytes; then the densities of each brick, {file.number('kDensityBlockBytes')} bytes,
+  volume by volume; then the labels of each brick, {file.number('kLabelBlockBytes')} bytes, of the volumes that have labels. Zeros fill the last block of text.
+* records: `count` records of a ring of the segment, with the segment's layout. Record i has the index `first + i * stride`.
+  Flag {file.number('kPacked')}: packed. In a run of two arms `ring` is 2 instead of 0: each record is the first arm's record of a tick, followed by the
+  second arm's.
+* command: `kind` is one of
+{kinds}
+* view: a viewer with the right to command sends its view up to 60 times a second. The server sends a changed view to all viewers.
+  Only one viewer presents at a time; another viewer that tries gets the presenter's view instead. The server ignores a view with
+  a number that is not finite or beyond 1e5, a view with `eye_mm` equal to `target_mm`, and a view whose `up` is zero or parallel
+  to the direction of view.
 * reply: `status` {replies.replace('`kCommandSlots`', str(command.number('kCommandSlots')))}.
 
-`set_hash` is the sum of `block_hash` over all blocks that the viewer holds, mod 2^64; `session` is that of the hello:
+`set_hash` is the sum of `block_hash` over all blocks that the viewer has, mod 2^64. `session` is the session of the hello:
 
     block_hash(id, version, session):
 {chr(10).join('        ' + step for step in steps)}
 
-A connection is closed with {', '.join(f'{value} `{word}`' for word, value, _ in file.enumerators('CloseCode'))}.
+The server closes a connection with one of the codes: {', '.join(f'{value} `{word}`' for word, value, _ in file.enumerators('CloseCode'))}.
 
 {chr(10).join(messages())}"""
 
@@ -315,11 +359,13 @@ def page(root, programs):
          {path.stem for path in (root / "shared/wire").glob("*.hpp")} - {"little_endian", "personality"})
     return f"""# Wire bytes
 
-All little-endian. The drivers of `controller/device` and the emulator share these layouts, in `shared/wire`.
+All numbers are little-endian. The drivers in `controller/device` and the emulator share these layouts, in `shared/wire`.
 
-This page is enough to write a host for the emulator, or a device for the controller. Two examples were written from it:
-`examples/python/omni_host.py` and `examples/python/falcon_device.py`. Frame of every device: x right, y up, z to the user, mm.
-Torque scales (N mm per count) are the host's setting: `torque_scale` of a scene, `--torque-scale`; `./kerf emulator
---personality D --describe` prints the emulated device's.
+From this page you can write a host for the emulator, or a device for the controller. Two examples were written from it:
+`examples/python/omni_host.py` and `examples/python/falcon_device.py`.
+
+* The frame of every device is x right, y up, z to the user, in mm.
+* A torque scale is the torque of one motor count (WoodenHaptics: of 1 mA), in N mm. The host sets it: `torque_scale` in a scene,
+  or `--torque-scale`. `./kerf emulator --personality D --describe` prints the torque scales of the emulated device.
 
 {chr(10).join(part(root) for part in (omni, falcon, wooden, cartesian, inverse3, links, bridge))}"""
