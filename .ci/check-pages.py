@@ -8,7 +8,7 @@
 
 A page ends with a line <!-- made by: COMMAND; sources: HASH --> for each command that makes a part of it. The hash is over the
 code of the sources, without their paths and comments: neither a renamed file nor another comment makes a page stale. Pages
-that a test makes again and compares (scene-keys, script-keys, reports, segment, wire, log) need no hash."""
+that a test makes again and compares (scene-keys, reports, segment, wire, log) need no hash."""
 import hashlib
 import io
 import pathlib
@@ -20,13 +20,13 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 RIG = ["lab/rig/*"]
 # Page, or page#part, the command that makes it, the sources of its rows and texts.
 PAGES = {
-    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py", "lab/rig/contact_rig.*"]),
-    "docs/contact.md": ("./kerf studies extremes --data DIR --page docs/contact.md",
+    "docs/contact.md#accuracy": ("./kerf lab accuracy --page docs/contact.md", ["lab/accuracy/*", "lab/report/accuracy.py", "lab/rig/contact_rig.*"]),
+    "docs/contact.md#contact": ("./kerf studies extremes --data DIR --page docs/contact.md",
                         ["tests/studies/contact/*", "lab/report/contact.py", "tests/rig/*", *RIG]),
-    "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*", "lab/report/energy.py", "lab/rig/port_loop.hpp", "controller/law/*"]),
+    "docs/stability.md#energy": ("./kerf lab energy --page docs/stability.md", ["lab/stability/energy_*", "lab/report/energy.py", "lab/rig/port_loop.hpp", "controller/law/*"]),
     "docs/reality.md": ("./kerf lab reproduce --page docs/reality.md",
                         ["lab/reproduce/*", "lab/report/reproduce*", "controller/stability/*"]),
-    "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
+    "docs/stability.md#maps": ("./kerf lab zwidth --page docs/stability.md",
                           ["lab/stability/*", "!lab/stability/energy_*", "lab/impedance/*", "controller/stability/*", "lab/report/stability*"]),
     "docs/performance.md#kernels": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", "lab/report/kernels.py", *RIG]),
     "docs/performance.md#pictures": ("./kerf bench pictures --page docs/performance.md", ["visualizer/bench/*", "lab/report/pictures.py"]),

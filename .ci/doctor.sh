@@ -33,7 +33,7 @@ built() { [[ -x $bin/kerf-controller ]] && { [[ $me == kerf || -n ${KERF_BIN:-} 
 system=$(. /etc/os-release 2>/dev/null && echo "${ID:-} ${VERSION_ID:-}" && echo "${PRETTY_NAME:-${ID:-}}") || true
 case ${system%%$'\n'*} in
   'debian 12' | 'debian 13') row ok system "${system#*$'\n'}" ;;
-  *) row warn system "${system#*$'\n'}" 'kerf was tried on Debian 12 and 13: docs/packages.md; elsewhere the Containerfile runs it' ;;
+  *) row warn system "${system#*$'\n'}" 'kerf was tried on Debian 12 and 13: docs/compatibility.md; elsewhere the Containerfile runs it' ;;
 esac
 
 right=$("$root/.ci/packages.sh" --right 2>/dev/null) || right=none  # how this user installs packages
@@ -90,7 +90,7 @@ programs() {
     [[ -x $bin/kerf-$name ]] || lack+=("kerf-$name")
   done
   if ((${#lack[@]})); then
-    row fail kerf "installed, without ${lack[*]} in $bin" 'install the package kerf again: docs/packages.md'
+    row fail kerf "installed, without ${lack[*]} in $bin" 'install the package kerf again: docs/compatibility.md'
   else
     row ok kerf "$("$bin/kerf-controller" --version 2>&1 | head -n 1), installed"
   fi

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # `cmake --install`, in two components. kerf: programs, ./kerf itself as `kerf`, what they need, man pages,
-# completion, docs. development: what a project of one's own needs to build upon kerf (docs/packages.md):
+# completion, docs. development: what a project of one's own needs to build upon kerf (docs/compatibility.md):
 # include/kerf, libkerf, find_package(kerf).
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)

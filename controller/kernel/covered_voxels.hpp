@@ -167,7 +167,7 @@ template <class N, class Overlap>
   return detail::CoverScan<N>(grid, density, labels, memory).run(overlap, frame);
 }
 
-// Removal of a budget from the covered voxels (docs/theory.md 6.2).
+// Removal of a budget from the covered voxels (docs/forces.md 6.2).
 //
 // A voxel loses whole density steps. Fractions are rounded up or down by a phase that advances by
 // one irrational number from voxel to voxel and by another from tick to tick (powers of the plastic
@@ -314,7 +314,7 @@ inline void weigh_again(CoveredGroups& covered) noexcept {
   return taken;
 }
 
-// Loads: which of the materials under the tool bear its press (docs/theory.md 6.2). A tool in its
+// Loads: which of the materials under the tool bear its press (docs/forces.md 6.2). A tool in its
 // own bore covers voxels of the wall all around, but rests on one side of it. A contact is a plane
 // with the normal n, out of the solid, through a point of the tool's surface. Voxel j lies h_j
 // above it, and counts at the contact with ahead(j) = 1 - h_j / w if that is positive.

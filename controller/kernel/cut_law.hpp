@@ -11,7 +11,7 @@
 #include "shared/numeric/elementary.hpp"
 #include "shared/numeric/numbers.hpp"
 
-// How press and speed of a bur become removal (docs/theory.md 6.1):
+// How press and speed of a bur become removal (docs/forces.md 6.1):
 //
 //   drive = F_1 ((min(F_n, F_s) - F_0) / F_1)^a (omega / omega_ref)^b / (1 + W / W_half)
 //

@@ -13,7 +13,7 @@
 
 namespace kerf {
 
-/// How the density gradient is estimated (docs/theory.md 7.2); each kernel spans 5x5x5 voxels.
+/// How the density gradient is estimated (docs/forces.md 7.2); each kernel spans 5x5x5 voxels.
 enum class GradientKernel : std::uint8_t {
   central,  ///< central difference, two voxels: cheap and rough
   sobel5,   ///< binomial smoothing

@@ -113,7 +113,7 @@ struct BoxScratchSize {
           .live = rows};
 }
 
-// The method `aligned` (docs/theory.md 7.6): the tool's voxels lie on a lattice as fine as that of
+// The method `aligned` (docs/forces.md 7.6): the tool's voxels lie on a lattice as fine as that of
 // the volume and are not rotated. Only the density is stored; a cut refreshes nothing.
 
 /// Fraction bits that contact sums keep.
@@ -173,7 +173,7 @@ struct SamplePose {
 /// stays within 2^31, and 32-bit arithmetic gives the place that `sample_position` gives.
 inline constexpr std::int32_t kSampleReachVox = 1000;
 
-// The method `splat` (docs/theory.md 7.6): any pose of any shape, in scenes that cut. Forces and
+// The method `splat` (docs/forces.md 7.6): any pose of any shape, in scenes that cut. Forces and
 // removal need only the sums PHI_j of the samples' weights. Only the density is stored; a cut
 // refreshes nothing.
 
@@ -212,7 +212,7 @@ struct SplatScratchSize {
           .rest_live = rows};
 }
 
-// Plain structs for the kernels that weigh and cut the voxels under a tool (docs/theory.md 6.2).
+// Plain structs for the kernels that weigh and cut the voxels under a tool (docs/forces.md 6.2).
 
 /// Most materials of a cut; a larger label counts as the last of them.
 inline constexpr std::size_t kMaxCutMaterials = 64;

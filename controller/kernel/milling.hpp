@@ -39,7 +39,7 @@ namespace kerf {
   return part;
 }
 
-/// The part of a voxel with overlap c that one tick removes (docs/theory.md 7.5): the fraction c *
+/// The part of a voxel with overlap c that one tick removes (docs/forces.md 7.5): the fraction c *
 /// min(1, kT), or 1 - exp(-c kT) in the exact form, whose result after a given time does not depend
 /// on the rate.
 ///
@@ -128,7 +128,7 @@ template <class N>
 
 /// SUM over voxels j with c_j > 0 and density > 0 of c_j grad_j, the stored gradient: in density
 /// steps per voxel times kWeightOne. The modification force is minus this, scaled by p1 V_voxel
-/// (docs/theory.md 7.4).
+/// (docs/forces.md 7.4).
 ///
 /// Fixed: exact, 2^30 per voxel leaves room for 2^33 voxels. Floating: x, then y, then z.
 template <class N>

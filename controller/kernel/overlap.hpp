@@ -17,7 +17,7 @@
 namespace kerf {
 
 /// The fraction of each voxel near the tool that the tool covers, 0..kWeightOne: the paper's
-/// overlap ratio (docs/theory.md 7.3).
+/// overlap ratio (docs/forces.md 7.3).
 ///
 /// `memory` is the caller's, sized once with `overlap_capacity`; the rest is written by `overlap`.
 /// The box may stick out of the volume by one voxel; read through `row` inside `box` only.

@@ -19,7 +19,7 @@ namespace kerf {
 
 /// SUM over tool samples i of SUM over the corners j of its cell of phi_ij grad_j: the interpolated
 /// gradients added up, in density steps per voxel times kWeightOne. The paper's contact force is
-/// minus this, scaled by p0 a^3 (docs/theory.md 7.1).
+/// minus this, scaled by p0 a^3 (docs/forces.md 7.1).
 ///
 /// A sample whose cell is not wholly inside the volume does not count. `field` holds one gradient
 /// per voxel. Fixed: nothing is rounded but the weights, so the order of samples does not matter;

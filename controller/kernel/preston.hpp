@@ -13,7 +13,7 @@
 namespace kerf {
 
 // Cutting by force: Preston's law, distributed over the voxels under the tool by the covered
-// fraction of each (o_j) times the speed of the tool's surface there (v_j): docs/theory.md 6.2.
+// fraction of each (o_j) times the speed of the tool's surface there (v_j): docs/forces.md 6.2.
 // Material that cannot be cut carries its part of the force and stays. With several volumes the sum
 // of o v is over all of them: `CoveredWeights::whole`.
 

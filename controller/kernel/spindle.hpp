@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// The motor of the tool (docs/theory.md 6.5): I d(omega)/dt = tau_motor - tau_load, with
+/// The motor of the tool (docs/forces.md 6.5): I d(omega)/dt = tau_motor - tau_load, with
 /// the straight line of a turbine, tau_motor = tau_stall (1 - omega / omega_free). Constant during
 /// a run; made by `spindle_plan`.
 template <class N>
@@ -60,7 +60,7 @@ constexpr void turn_spindle(const SpindlePlan<N>& plan, bool on, typename N::Rea
 }
 
 /// Friction of the rotating tool on hand and spindle: F_t = mu F_n against omega x lever
-/// (docs/theory.md 6.5). Made by `cutting_friction`.
+/// (docs/forces.md 6.5). Made by `cutting_friction`.
 template <class N>
 struct FrictionPlan {
   typename N::Real coefficient{};  ///< F_t / F_n

@@ -17,7 +17,7 @@
 namespace kerf {
 
 /// Least speed of the tool's surface over that of its rim: abrasive grains at the pole of a ball
-/// still cut a little, and a flat end would otherwise never cut its middle (docs/theory.md 6.3).
+/// still cut a little, and a flat end would otherwise never cut its middle (docs/forces.md 6.3).
 inline constexpr double kSpeedFloor = 0.08;
 
 /// Square roots of 0, 1/1024 .. 1 as weights of fixed point in the low halves, the difference to

@@ -13,7 +13,7 @@
 namespace kerf {
 
 /// The stabiliser `passivity`: the passivity controller in the time domain of Hannaford and Ryu
-/// (2002), at the port of the device (docs/theory.md 5.6).
+/// (2002), at the port of the device (docs/forces.md 5.6).
 ///
 /// It keeps an account of the energy that the loop took from the hand. If the account is below 0 it
 /// damps along the motion so much that the account is 0 if the hand continues its last motion:
@@ -32,7 +32,7 @@ class PassivityController {
   static constexpr const char* kName = "passivity";
   static constexpr const char* kMeaning =
       "passivity controller in the time domain: damps where the loop gave more than it took "
-      "(docs/theory.md 5.6)";
+      "(docs/forces.md 5.6)";
   static constexpr std::array<LawSetting, 1> kSettings{
       {{"mass_kg", "kg", 0.001, 10, 0.045,
         "apparent mass of the device: the damping is at most this over the period"}}};
@@ -113,7 +113,7 @@ class PassivityController {
 };
 
 /// The stabiliser `energy_bounding`: bounds the force by the energy that the next hold may give
-/// (docs/theory.md 5.6), after the idea of Kim and Ryu (2010).
+/// (docs/forces.md 5.6), after the idea of Kim and Ryu (2010).
 ///
 /// However the hand moves by d in the next tick, a force of F gives it F . d and the device's own
 /// damping b takes at least b d^2 / T, so together they give at most F^2 T / (4 b). With the budget
@@ -130,7 +130,7 @@ class EnergyBounding {
   static constexpr const char* kName = "energy_bounding";
   static constexpr const char* kMeaning =
       "bounds the force by what the hand put in and the device's damping takes "
-      "(docs/theory.md 5.6)";
+      "(docs/forces.md 5.6)";
   static constexpr std::array<LawSetting, 1> kSettings{
       {{"damping_ns_per_mm", "N s/mm", 1e-6, 0.1, 0.0002,
         "viscous damping of the device's own; no more than it really has"}}};

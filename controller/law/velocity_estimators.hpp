@@ -24,7 +24,7 @@ struct VelocityPlan {
   typename N::Real noise_mm{};  ///< largest error of an encoder reading
 };
 
-/// Velocity of the tip by first-order adaptive windowing (docs/theory.md 5.2): on each axis the
+/// Velocity of the tip by first-order adaptive windowing (docs/forces.md 5.2): on each axis the
 /// longest window of at most 16 intervals whose line misses no sample by more than twice
 /// `noise_mm`, because the sample and the newest position can each be off by `noise_mm`. A resting
 /// hand therefore keeps the full window. Servo thread; 135 comparisons an axis at most; no heap.
@@ -193,7 +193,7 @@ class Foaw {
  public:
   static constexpr const char* kName = "foaw";
   static constexpr const char* kMeaning =
-      "first-order adaptive windowing, best fit over at most 16 intervals (docs/theory.md 5.2)";
+      "first-order adaptive windowing, best fit over at most 16 intervals (docs/forces.md 5.2)";
   static constexpr std::array<LawSetting, 0> kSettings{};
   using State = VelocityWindow<N>;
 

@@ -11,7 +11,7 @@
 
 namespace kerf {
 
-/// The virtual coupling between hand and proxy at the device port (docs/theory.md 5.1): the only
+/// The virtual coupling between hand and proxy at the device port (docs/forces.md 5.1): the only
 /// stiff element of the loop, since the proxy has no mass.
 template <class N>
 struct VirtualCoupling {

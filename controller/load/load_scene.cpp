@@ -132,7 +132,7 @@ SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched, const Mesh
   if (!spec.pitch_given) {
     // Samples end inside of the surface by up to a pitch, and leave as large a part of that cell of
     // the volume; if that is more than half, the tool rests on it and never cuts it
-    // (docs/theory.md 6.3).
+    // (docs/forces.md 6.3).
     const bool thin = !size.size_vox && size.radius_mm < touched.voxel_mm;
     size.pitch_mm = thin && spec.shape != kMeshShape ? touched.voxel_mm / 2 : touched.voxel_mm;
   }

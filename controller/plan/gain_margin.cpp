@@ -133,7 +133,7 @@ void set_worst_slope(const LoadedScene& scene, const SampledLoop& loop, GainMarg
 /// From the linear boundary upwards in steps of 1 %, to the first wall on which a push is not
 /// proven to come to rest: with friction and an encoder, walls that rest lie above others that
 /// swing. The push is half of the contact's largest force: there a swing has the most room between
-/// no force and that one, and the larger it is, the less friction holds it (docs/theory.md 5.7).
+/// no force and that one, and the larger it is, the less friction holds it (docs/forces.md 5.7).
 /// Damping that is unstable without any wall has no such boundary: friction stops only small swings
 /// then, even if one push decays.
 double with_friction(const SampledLoop& loop, double damping, double linear_n_per_mm,
@@ -150,7 +150,7 @@ double with_friction(const SampledLoop& loop, double damping, double linear_n_pe
 }
 
 /// That the contact of a scene can have at the device: the limit's, or what the paper's force has
-/// at half of the ball's depth, p0 pi R^2 (docs/theory.md 7.1).
+/// at half of the ball's depth, p0 pi R^2 (docs/forces.md 7.1).
 double largest_force_n(const LoadedScene& scene) {
   const double limit_n = scene.limits.force_n;
   if (scene.force.model != ForceModel::paper) return limit_n;

@@ -7,7 +7,7 @@
 #include "controller/load/loaded_scene.hpp"
 
 // Whether a device can hold the contact of a scene: its stiffness and damping against the exact
-// boundary of a sampled wall (docs/theory.md 5.7), at the scene's rate, with the figures of its
+// boundary of a sampled wall (docs/forces.md 5.7), at the scene's rate, with the figures of its
 // device (controller/stability), or those of `device.identified` across its worst direction, and
 // without a hand that damps it.
 //

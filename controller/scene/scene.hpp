@@ -85,7 +85,7 @@ inline constexpr double kMaxDampingNsPerMm = 1;
 inline constexpr std::string_view kPhantomFile = "phantom";
 
 /// Removal rate of enamel per newton at the reference speed, mm^3/(s N): 0.067 to 0.108 of human
-/// enamel under a diamond bur at 50 to 80 g (docs/theory.md 6.6).
+/// enamel under a diamond bur at 50 to 80 g (docs/forces.md 6.6).
 inline constexpr double kEnamelMm3PerSN = 0.083;
 inline constexpr double kReferenceSpeedKrpm = 300;
 
@@ -120,7 +120,7 @@ enum class CutPedal : std::uint8_t {
 enum class Grit : std::uint8_t { none, medium, coarse, super_coarse };
 
 /// How press and speed of a bur become removal, beside the machinability of what it cuts
-/// (docs/theory.md 6.1). As it is here: Preston's law.
+/// (docs/forces.md 6.1). As it is here: Preston's law.
 struct BurLaw {
   double force_exponent = 1;  ///< a
   double speed_exponent = 1;  ///< b

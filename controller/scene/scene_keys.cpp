@@ -99,7 +99,7 @@ TomlValue value_of(const SceneKey& key, SceneParts& parts) {
 }
 
 // The table. A new key is one row here, its member in scene.hpp, and its use; then
-// `./kerf controller --scene-keys > docs/scene-keys.md`.
+// `tests/docs/reference/make.py . build/release/bin write`.
 
 namespace {
 

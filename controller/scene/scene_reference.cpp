@@ -16,8 +16,7 @@ constexpr std::string_view kHead =
     "# Scene keys\n\n"
     "Every key of a scene file (TOML), from the table in `controller/scene/scene_keys.cpp`. "
     "Examples\n"
-    "are in `scenes/`. This page is made by\n\n"
-    "    ./kerf controller --scene-keys > docs/scene-keys.md\n";
+    "are in `scenes/`. `./kerf controller --scene-keys` prints this list.\n";
 
 /// The allowed values, by the type of the slot.
 struct AllowedText {

@@ -87,9 +87,9 @@ template <class N>
 }
 
 /// One tick: the proxy of the active tool follows the hand, and the force law pulls the hand to the
-/// proxy (docs/theory.md 4, 5.1). `rotation` orients the tool, unless it is a ball without a shaft
-/// or keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact` and
-/// `state.force_law`. A force law can return a force that is not finite.
+/// proxy (docs/theory.md 4, docs/forces.md 5.1). `rotation` orients the tool, unless it is a ball
+/// without a shaft or keeps the world's axes. Servo thread; at most 32 queries; writes
+/// `state.contact` and `state.force_law`. A force law can return a force that is not finite.
 template <class N>
 [[nodiscard]] ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
                                            WorldVec<typename N::Real> tip_mm,

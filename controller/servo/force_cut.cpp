@@ -15,7 +15,7 @@
 namespace kerf {
 namespace {
 
-// The distribution of a press over the materials of all volumes (docs/theory.md 6.2).
+// The distribution of a press over the materials of all volumes (docs/forces.md 6.2).
 
 /// The covered voxels of all volumes. Each `load` is a part of one `whole`.
 template <class N>

@@ -11,7 +11,7 @@
 namespace kerf {
 
 // Cutting by the force that the hand feels, in the same tick. It uses the force after all limits,
-// because a force that the hand does not feel must not cut (docs/theory.md 6.1).
+// because a force that the hand does not feel must not cut (docs/forces.md 6.1).
 
 /// What one tick cut.
 template <class N>

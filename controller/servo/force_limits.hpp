@@ -9,7 +9,7 @@
 
 namespace kerf {
 
-/// Limits at the device port (docs/theory.md 5.4); the plan holds them in the loop's numbers.
+/// Limits at the device port (docs/forces.md 5.4); the plan holds them in the loop's numbers.
 template <class N>
 struct ForceLimits {
   typename N::Real peak_n;             ///< |F| never above it
@@ -18,7 +18,7 @@ struct ForceLimits {
   typename N::Ratio thermal_per_tick;  ///< T / thermal time constant
 };
 
-/// RMS budget: a first-order model of the winding's heat (docs/theory.md 5.4), in N^2.
+/// RMS budget: a first-order model of the winding's heat (docs/forces.md 5.4), in N^2.
 template <class N>
 struct ThermalState {
   typename N::Energy heat_n2{};

@@ -33,7 +33,7 @@
 
 namespace kerf {
 
-/// Converts an exact sum of weighted gradients (voxel axes; docs/theory.md 7) to a force at the
+/// Converts an exact sum of weighted gradients (voxel axes; docs/forces.md 7) to a force at the
 /// device port (N): one matrix that holds pressure, sample volume, voxel size, rotation and
 /// workspace scale.
 ///
@@ -164,7 +164,7 @@ struct SweptTool {
 };
 
 /// The tool cuts kCutAdvance deeper than the surface that it rests on, so that its groove leaves it
-/// play (docs/theory.md 6.3); units of contact space. While it covers less than its force would
+/// play (docs/forces.md 6.3); units of contact space. While it covers less than its force would
 /// cut, the advance grows, up to kDeepestAdvance; afterwards it slowly returns.
 ///
 /// It may cover less because its inner samples end below its surface, by up to a pitch
@@ -218,8 +218,8 @@ struct ToolInVolume {
   Method method = Method::gather;         ///< of contact and cut
   const AlignedTable* aligned = nullptr;  ///< of the method `aligned`
   // Of the method's own sums:
-  SumToForce<N> contact;  ///< F_c = -p0 a^3 SUM grad (docs/theory.md 7.1), times workspace scale
-  SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM c grad (docs/theory.md 7.4), scaled alike
+  SumToForce<N> contact;  ///< F_c = -p0 a^3 SUM grad (docs/forces.md 7.1), times workspace scale
+  SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM c grad (docs/forces.md 7.4), scaled alike
   /// If force cuts: from voxel edges to rim radii along the world's axes, for a `SpindleFrame`.
   Transform<typename N::Ratio, WorldSpace, VoxelSpace> rims_from_voxel;
 };

@@ -18,7 +18,7 @@ namespace kerf {
                                      bool at_worst);
 
 /// About the lowest stiffness, N/mm, that any push makes oscillate on a device with friction whose
-/// motors give `peak_n` (docs/theory.md 5.7, with the exact boundary in place of b/(T/2 + td)).
+/// motors give `peak_n` (docs/forces.md 5.7, with the exact boundary in place of b/(T/2 + td)).
 /// With an infinite peak, or without friction, the exact linear boundary.
 [[nodiscard]] double pushed_stiffness(const SampledLoop& loop, double damping_ns_per_mm,
                                       double peak_n);

@@ -30,7 +30,7 @@ std::complex<double> law_at(const SampledLoop& loop, double stiffness, double da
   return stiffness + damping * (step / (1.0 + lag * step) / loop.period_s);
 }
 
-/// Damping that motion of the angle w needs (docs/theory.md 5.7), at z = e^jw.
+/// Damping that motion of the angle w needs (docs/forces.md 5.7), at z = e^jw.
 double viscosity_at(const SampledLoop& loop, double stiffness, double damping, double w) {
   const double delay = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
   const double whole = std::floor(delay), part = delay - whole;

@@ -50,7 +50,7 @@ static_assert(covers_devices(kDeviceFigures));
 }
 
 /// The loop of that device at a rate, without a hand: a light grip is the worst case, since the
-/// damping of a firm hand comes on top (docs/theory.md 5.7).
+/// damping of a firm hand comes on top (docs/forces.md 5.7).
 [[nodiscard]] constexpr SampledLoop unheld_loop(Personality personality, double rate_hz) noexcept {
   const DeviceFigures device = device_figures(personality);
   SampledLoop loop;

@@ -36,7 +36,7 @@ class SampleLattice {
   ///
   /// Samples of a rim or a point end inside of the surface: of a circle of 3.04 pitches, in a layer
   /// that is a little narrower, the lattice has 2 along its axes. Voxels beyond are in contact and
-  /// never cut, so the tool would rest on them for ever (docs/theory.md 6.3).
+  /// never cut, so the tool would rest on them for ever (docs/forces.md 6.3).
   void cover(const std::array<double, 3>& place);
 
   /// Side of the samples along x and z: `across`, less the empty planes at its ends.

@@ -83,8 +83,8 @@ def as_python_markdown(markdown):
     return lines, codes
 
 
-FORMULAS = {"theory.md", "wire.md"}  # their indented blocks are formulas, where they can be read as such
-IN_TEXT = {"theory.md"}  # formulas within its text, too
+FORMULAS = {"theory.md", "forces.md", "wire.md"}  # their indented blocks are formulas, where they can be read as such
+IN_TEXT = {"theory.md", "forces.md"}  # formulas within its text, too
 # Parts of a line that stay as they are, and a page that is named: in code, or plain, perhaps with its section behind it.
 NAMED = re.compile(r"""(?P<link>!?\[[^]]*\]\([^)]*\)|<[^>]+>)|(?P<tick>`?)docs/(?P<page>[\w-]+\.md)(?P=tick)"""
                    r"""(?P<section>,? "[^"]+"| \d+(?:\.\d+)?(?![\w.]*\w))?|(?P<code>`[^`]*`)""")

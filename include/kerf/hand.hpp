@@ -18,7 +18,7 @@ namespace kerf {
 ///     servo.step(hand.next(servo.last()));
 ///
 /// The hand rests until the device is calibrated, for 0.1 s (Falcon: 0.65 s), reaches for the start
-/// of its script, goes through it and stays at its end (docs/script-keys.md). No force comes before
+/// of its script, goes through it and stays at its end (docs/scene-keys.md). No force comes before
 /// the phase `ramping`: step for some seconds, or until `ended`. One thread.
 class Hand {
  public:

@@ -14,7 +14,7 @@
 #include "kerf/scene.hpp"
 
 // How stiff a sampled wall may be on a device: exact boundaries and passivity bounds of one axis,
-// runs of a hand that pushes against it, and maps of such runs. docs/theory.md 5.7 derives the
+// runs of a hand that pushes against it, and maps of such runs. docs/forces.md 5.7 derives the
 // formulas, docs/stability.md has the maps.
 //
 //     kerf::SampledLoop loop = kerf::device_loop("falcon", 1000);
@@ -69,14 +69,14 @@ inline constexpr double kMaxDelayPeriods = 64;
 [[nodiscard]] SampledLoop device_loop(std::string_view device, double rate_hz,
                                       std::string_view direction = {});
 
-// Limits of the gains of a sampled wall (docs/theory.md 5.7).
+// Limits of the gains of a sampled wall (docs/forces.md 5.7).
 //
 // Passivity: bounds for every hand, or short formulas. Passive is more than stable: a passive wall
 // never gives energy, whatever the hand does. The hand of the loop is not used.
 
 /// The device damping (N s/mm) above which the wall is passive, by a scan of the circle: Colgate
 /// and Schenkel's (T/2) max_w Re[(1 - e^-jwT) H(e^jwT)] / (1 - cos wT), and, if the delay has a
-/// part of a period, the energy that a hand gains between two samples (docs/theory.md 5.7). Never
+/// part of a period, the energy that a hand gains between two samples (docs/forces.md 5.7). Never
 /// below 0.
 [[nodiscard]] double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
                                        double damping_ns_per_mm);
@@ -104,7 +104,7 @@ inline constexpr double kMaxDelayPeriods = 64;
 /// The largest B (N s/mm) that is stable without any stiffness (K -> 0): no wall may have more.
 [[nodiscard]] double highest_damping(const SampledLoop& loop);
 
-// What a hand feels that moves the tip as a sine (docs/theory.md 5.8): force over velocity, N s/mm,
+// What a hand feels that moves the tip as a sine (docs/forces.md 5.8): force over velocity, N s/mm,
 // of the fundamental. Re Z is the damping that it feels, -w Im Z the stiffness. Of a linear wall,
 // up to half of the servo's rate.
 
@@ -168,7 +168,7 @@ struct WallRun {
   /// Shifts the steps of the encoder against the wall; 0: an edge is on it.
   std::uint64_t seed = 1;
   std::string law = "coupling";    ///< or "linear", "two_sided", or the name of a law
-  std::string estimator = "foaw";  ///< a velocity estimator of docs/theory.md 5.3
+  std::string estimator = "foaw";  ///< a velocity estimator of docs/forces.md 5.3
   bool fixed_point = true;         ///< the servo's numbers; else double
   bool limits = true;              ///< peak and slew of the default device
 };
@@ -214,7 +214,7 @@ struct MapOptions {
   /// Ends the map when another thread sets it: columns that are not done then have no cells.
   const std::atomic<bool>* stop = nullptr;
   /// Of a device that is a file: "x", "y", "z", such as "1,0,1", or "worst", as if empty, the one
-  /// with the lowest stiffness that any push makes oscillate, by docs/theory.md 5.7.
+  /// with the lowest stiffness that any push makes oscillate, by docs/forces.md 5.7.
   std::string direction{};
 };
 

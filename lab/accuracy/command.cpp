@@ -89,8 +89,8 @@ AccuracyCommand::AccuracyCommand(Arguments& program)
   app_.option("--csv", csv_, "write the figures as a table").shown_as("FILE");
   app_.option("--plot", plot_, "draw error against time as SVG").shown_as("FILE");
   app_.option("--page", page_,
-              "write the figures as a page (docs/accuracy.md), and the plot in plots/ beside it "
-              "unless --plot says where")
+              "write the figures as their part of a page (docs/contact.md), and the plot in plots/ "
+              "beside it unless --plot says where")
       .shown_as("FILE");
   app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
 }
@@ -99,7 +99,7 @@ int AccuracyCommand::run(std::ostream& out) const {
   const LabOutput as_json("--report", report_, ".json");
   const LabOutput as_csv("--csv", csv_, ".csv");
   const LabOutput as_page("--page", page_, ".md");
-  const std::string plot = plot_.empty() ? page_plot("--page", page_, ".svg") : plot_;
+  const std::string plot = plot_.empty() ? page_plot("--page", page_, ".accuracy.svg") : plot_;
   const LabOutput as_plot("--plot", plot, ".svg");
   LabOutput::check_distinct({&as_json, &as_csv, &as_page, &as_plot});
   if (!scene_.empty() && !(page_.empty() && plot.empty())) {
@@ -123,7 +123,8 @@ int AccuracyCommand::run(std::ostream& out) const {
   as_csv.write(csv(entries));
   as_plot.write_report({"accuracy", "plot"}, report, out);
   if (!page_.empty()) {
-    as_page.write_report({"accuracy", "page", page_link(page_, plot)}, report, out);
+    as_page.write_part("accuracy",
+                       make_report({"accuracy", "page", page_link(page_, plot)}, report), out);
   }
   return 0;
 }

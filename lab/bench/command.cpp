@@ -94,8 +94,7 @@ int BenchCommand::run(std::ostream& out) const {
     const std::string report = json_of(rows, queries, layout, core);
     as_json.write(report);
     if (!page_.empty()) {
-      as_page.write_part("kernels", make_report({"kernels", "page", page_}, report));
-      out << page_ << ": written\n";
+      as_page.write_part("kernels", make_report({"kernels", "page", page_}, report), out);
     }
     return 0;
   }

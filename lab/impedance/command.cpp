@@ -91,7 +91,7 @@ ImpedanceCommand::ImpedanceCommand(Arguments& program)
   app_.option("--plot", plot_, "draw stiffness and damping over frequency (SVG)").shown_as("FILE");
   app_.footer(
       "Each option has one value. K and B felt are -w Im Z and Re Z of the force over the velocity "
-      "of a\ntip that moves as a sine in the wall; docs/theory.md 5.8.\n"
+      "of a\ntip that moves as a sine in the wall; docs/forces.md 5.8.\n"
       "Exit codes: 0 fine, 2 bad input or set-up.");
 }
 

@@ -85,7 +85,7 @@ std::optional<Stroke> stroke_at(const zwidth::LoopCase& subject, double stiffnes
   const double gain =
       rad_per_s / held *
       std::abs(wall_impedance(at_once, stiffness_n_per_mm, subject.damping_ns_per_mm, hz));
-  // The damper of the coupling is in full from this penetration on (docs/theory.md 5.1).
+  // The damper of the coupling is in full from this penetration on (docs/forces.md 5.1).
   constexpr double kFullMm = 0.1;
   // A step of the encoder is a speed, and a difference without a window damps it at once.
   const double jump_n =

@@ -8,7 +8,7 @@
 
 #include "lab/stability/axes.hpp"
 
-/// What a hand feels over frequency (docs/theory.md 5.8): by theory, and from motion.
+/// What a hand feels over frequency (docs/forces.md 5.8): by theory, and from motion.
 namespace kerf::impedance {
 
 /// Force over velocity, N s/mm.

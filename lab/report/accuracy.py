@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of accuracy (docs/accuracy.md) and its plot. JSON of `kerf lab accuracy --report`:
+"""The part of docs/contact.md on the accuracy of each setting, and its plot. JSON of `kerf lab accuracy --report`:
 
     provenance                  day, machine and compiler of the run
     rows                        one for each figure: {knob, value, standard, plain, shape, metric, figure, unit, us_p50, us_p99}.
@@ -10,9 +10,9 @@ import re
 import text
 
 ABOUT = """\
-# Accuracy
+## Accuracy of each setting
 
-Made by `./kerf lab accuracy --page docs/accuracy.md`; every figure comes from one run, nothing is typed
+Made by `./kerf lab accuracy --page docs/contact.md`; every figure comes from one run, nothing is typed
 by hand. On one machine a run repeats bit for bit, but for the times. `--csv` writes all figures, each metric on each
 shape; `--report` writes the same as JSON. `./kerf lab accuracy --scene mine.toml` measures the default contact with the
 tool and the voxels of a scene.
@@ -24,7 +24,7 @@ is changed at a time; the others stay at the standard, in bold.
 """
 
 PROXY = """\
-## The swept proxy
+### The swept proxy
 
 The default contact (docs/theory.md 4), as the servo runs it. A hand goes straight down from a contact; the tool should stay
 where it was, so that the spring from hand to tool is the way back. Faces are ramps over two voxels, as a scanner has them.
@@ -48,9 +48,9 @@ thinner than two voxels, not for the hand.
 """
 
 PAPER = """\
-## The paper's force
+### The paper's force
 
-One setting of the paper's contact force (docs/theory.md 7.1) is changed at a time. The standard is Q15 weights, tool
+One setting of the paper's contact force (docs/forces.md 7.1) is changed at a time. The standard is Q15 weights, tool
 pitch = voxel, `farid` gradients stored as int16, trilinear, voxels of 0.125 mm in 128^3.
 
 Truth is the shape itself with sharp faces: F = -p0 SURFINT rho n dA over the tool's surface, exact to 1e-4.
@@ -66,7 +66,7 @@ Forces are fractions of full scale, p0 pi R^2. `rms` and `max` are over all shap
 """
 
 REMOVAL = """\
-## Removal
+### Removal
 
 Not measured here; `tests/kernel/milling_test.cpp` bounds it. One stamp of a ball of five voxels' radius removes
 the ball's volume to 1 %, and a straight sweep of ten voxels' radius that stays on the voxels' lattice its capsule.
@@ -114,25 +114,25 @@ PROXY_KNOBS = [
 # Knob, its text, its columns.
 TABLES = [
     ("arithmetic", """\
-## Arithmetic
+### Arithmetic
 
 Force against the same text in double, in millionths of full scale, and one trilinear interpolation of
 random 16-bit corners, in steps of the corners. The servo has Q15 and double; Q8 and Q12 are
 coarser weights through its lerp.""",
      [DOUBLE, DOUBLE_MAX, CORNER, CORNER_MAX, MEMORY]),
     ("pitch", """\
-## Pitch of the tool's samples
+### Pitch of the tool's samples
 
 In voxel edges. A sample represents the cube around it, so a coarse ball does not have the ball's volume.""",
      [SAMPLES, THEORY, THEORY_MAX, DIRECTION, TOOL_LOOP, STEP]),
     ("kernel", """\
-## Gradient kernel
+### Gradient kernel
 
 `normal` is the angle between the gradient at the voxels on the ball's face and the exact normal; `noise` is the standard
 deviation that remains of white noise of deviation 1.""",
      [NORMAL, NORMAL_MAX, NOISE, SAMPLE_LOOP, TOOL_LOOP, THEORY]),
     ("storage", """\
-## What is stored beside the density
+### What is stored beside the density
 
 Int16 gradients are the servo's method `gather`, `aligned` its method for round tools, `splat` that for any
 tool in scenes that cut (its time holds the modification force, too). `spline 2` and `spline 3` are the
@@ -140,13 +140,13 @@ exact derivative of the density's quadratic and cubic B-spline: a reference for 
 time. The last row has voxels half as wide: compare it with that of `gather` in "Voxel edge".""",
      [SAMPLES, MEMORY, DOUBLE, DOUBLE_MAX, THEORY, DIRECTION, SAMPLE_LOOP, TOOL_LOOP]),
     ("interpolation", """\
-## Interpolation of the stored gradient
+### Interpolation of the stored gradient
 
 Trilinear is the servo's; the others are B-splines of degree 0, 2 and 3 in plain double. `step`: the
 change of the force over 0.01 voxel along the face, in thousandths of full scale.""",
      [STEP, DIRECTION, SAMPLE_LOOP, TOOL_LOOP, THEORY, NOISE]),
     ("voxel", """\
-## Voxel edge
+### Voxel edge
 
 The same millimetres in 64^3, 128^3 and 256^3 voxels, tool pitch = voxel. `order`: log2 of how much
 smaller the error is than in the row above; a blur of fixed width in voxels gives 2 in the limit.""",
@@ -155,7 +155,7 @@ smaller the error is than in the row above; a blur of fixed width in voxels give
 
 # A figure of a choice: {VALUE|COLUMN}, its time {VALUE|us}, or the ratio of two times {VALUE|VALUE}.
 ADVICE = """\
-## What to choose
+### What to choose
 
 * A round tool: the method `aligned`, {aligned|us} us a tick, at most {aligned|DOUBLE_MAX} ppm of full scale away from double. Nothing is
   stored, so a cut refreshes nothing.
@@ -264,7 +264,7 @@ def page(data, plot):
         parts.append(about + "\n\n" + knob_table(entries, knob, columns) + "\n")
     standard = next(entry for entry in entries if entry.standard)
     columns = [THEORY, THEORY_MAX, DIRECTION, DIRECTION_MAX, SAMPLE_LOOP, TOOL_LOOP, STEP]
-    parts.append("## The shapes\n\nThe standard on each shape.\n\n" + shape_table(standard, columns) + "\n")
+    parts.append("### The shapes\n\nThe standard on each shape.\n\n" + shape_table(standard, columns) + "\n")
     return "".join(parts) + REMOVAL
 
 

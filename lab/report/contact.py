@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of contact (docs/contact.md) and its plots. JSON of `kerf studies extremes --report`:
+"""The part of docs/contact.md that the study of contact makes, and its plots. JSON of `kerf studies extremes --report`:
 
     provenance                  day, machine and compiler of the run
     rows                        {group, name, value, unit, limit, aim, pass, skipped}: value null if it was not measured, and
@@ -23,7 +23,8 @@ The swept proxy (`[force] model = "proxy"`) keeps the whole tool out of the soli
 it. The paper's force (`"paper"`) is the sum of the density's gradients inside of the tool. docs/theory.md derives
 both. They are measured as the servo runs them: in fixed point, by the fastest kernels of this machine. Unless stated,
 a voxel is 0.1 mm, a tick 1 ms, the tool a ball of 16 voxels, and a face is a ramp of density over two voxels.
-The last part lists the promises of kerf and their tests.
+[Promises](#promises-and-their-tests) lists what kerf promises, with the tests. [Accuracy](#accuracy-of-each-setting) measures
+each setting of both forces.
 
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of energy (docs/energy.md), and its tables for the terminal. JSON of `kerf lab energy --report`:
+"""The part of docs/stability.md on energy, and its tables for the terminal. JSON of `kerf lab energy --report`:
 
     provenance                  day, machine and compiler of the run
     loops                       {model, numeric, share, most_share, friction_mj, leak_mj}
@@ -8,15 +8,15 @@
 import text
 
 HEAD = """\
-# Energy at the device port
+## Energy at the device port
 
-Work at the device port by the servo's own energy ledger (docs/theory.md 5.5), and the cost of the stabilisers
-(docs/theory.md 5.6). Positive energy flows from the hand into the loop. `./kerf lab energy --page docs/energy.md` writes this page.
+Work at the device port by the servo's own energy ledger (docs/forces.md 5.5), and the cost of the stabilisers
+(docs/forces.md 5.6). Positive energy flows from the hand into the loop. Made by `./kerf lab energy --page docs/stability.md`.
 
 """
 
 LOOPS = """\
-## Closed paths on a static ball
+### Closed paths on a static ball
 
 A ball of 1 mm radius, at a penetration of 0.6 mm in a ball of 3 mm, moves twice along each of six tilted circles of
 0.375 mm. The figures are of the second lap.
@@ -29,7 +29,7 @@ A ball of 1 mm radius, at a penetration of 0.6 mm in a ball of 3 mm, moves twice
 """
 
 FEEL = """
-## The effect of a stabiliser on the hand
+### The effect of a stabiliser on the hand
 
 A hand pushes with 1 N from 0.1 mm above a wall and releases after 2 s. Fixed point, 1 kHz, encoder steps of 0.055 mm,
 the limits of an Omni, no virtual damping.
@@ -45,7 +45,7 @@ the limits of an Omni, no virtual damping.
 """
 
 COST = """
-## The time they take
+### The time they take
 
 Time added to a tick in contact, in one run. Limit for ledger, observer and split of the spring: 1000 ns.
 

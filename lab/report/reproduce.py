@@ -458,7 +458,7 @@ friction does not hold the force of one encoder step, and whether the tip settle
 
 ENERGY = """\
 The energy that the port has taken from the hand, from the true work of the motors: below 0 the wall has given energy. A mass of 0.1 kg with
-0.2 N s/m falls onto the wall from 1 mm with 1 N. Observer and controller are those of the servo (docs/theory.md 5.6), at 1 kHz.
+0.2 N s/m falls onto the wall from 1 mm with 1 N. Observer and controller are those of the servo (docs/forces.md 5.6), at 1 kHz.
 
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of stability (docs/stability.md), from maps that it lets `kerf-lab zwidth` measure.
+"""The part of docs/stability.md on maps, from maps that it lets `kerf-lab zwidth` measure.
 
 measure reads {program, quick, jobs, provenance}: the path of kerf-lab, whether few cells and short hits are enough, its
 --jobs (0: all cores), and day and machine of the run. It returns the JSON that page, devices and rates read:
@@ -32,7 +32,7 @@ ABOUT = """\
 # Stability
 
 Made by `./kerf lab zwidth --page docs/stability.md`; every figure comes from one run, nothing is typed by hand. The
-same seed gives the same bytes on any number of cores. docs/theory.md 5.7 derives the analytic limits, 5.1 the force
+same seed gives the same bytes on any number of cores. docs/forces.md 5.7 derives the analytic limits, 5.1 the force
 of the wall.
 
 The Z-width of a device is the range of stiffness K that it can render, from free air to the stiffest stable wall. A
@@ -71,7 +71,7 @@ How a map is searched:
   *first* are tried with the bad press, too. The picture has a bar from the lowest to the highest *first* of a single seed. Stable cells above are reported separately,
   because a hand cannot reach them.
 * With friction the worst push is about half of the peak: the oscillation then has the most room between no force and the
-  peak, and friction takes the smallest part of a large oscillation (docs/theory.md 5.7).
+  peak, and friction takes the smallest part of a large oscillation (docs/forces.md 5.7).
 * There is no thermal limit: weaker motors would end an oscillation.
 
 A seed sets the phase of the encoder steps relative to the wall, which changes K by up to a factor of two for one press. It
@@ -112,7 +112,7 @@ STABILISERS = """
 
 The lowest unstable K with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping, as one axis / whole arm, of one seed.
 A stabiliser helps against a light push alone (`--push 0.5`) far more than against a hard one.
-docs/energy.md has the effect on the hand. `passivity` accounts for a force in the tick that commands it. With a delay the force
+[Energy](#the-effect-of-a-stabiliser-on-the-hand) has the effect on the hand. `passivity` accounts for a force in the tick that commands it. With a delay the force
 acts later, and the port may give far more energy than the account shows: `port_minimum_mj` of `--csv` has the lowest energy of the
 port in each cell. The first run that both oscillates and is active ends the search of its cell.
 
@@ -184,7 +184,7 @@ Which K may a device render, for any push, in its worst direction, and what does
 device from a file; [`./kerf identify`](gains.md#identify-your-device) writes such a file for your device.
 `examples/devices/premium15.toml` is a Phantom Premium 1.5 by published figures. Its mass is a matrix: 2.6 times as heavy in one
 direction as in another. `worst` is the
-direction with the lowest stiffness that any push makes oscillate, by theory (docs/theory.md 5.7); `--direction 1,0,0.5`
+direction with the lowest stiffness that any push makes oscillate, by theory (docs/forces.md 5.7); `--direction 1,0,0.5`
 sets another one.
 
 """
@@ -196,7 +196,7 @@ So it may render {k} N/mm at B = {b} N s/mm, the lowest K over 1.5 as in the tab
 
 FELT = """
 At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is stiffer and less damped than the wall of the theory
-(docs/theory.md 5.8), because `foaw` lags behind the difference that the theory has. At the device's port it feels
+(docs/forces.md 5.8), because `foaw` lags behind the difference that the theory has. At the device's port it feels
 {port_k} N/mm and {port_b} N s/mm, since the mass counts against the spring. Where the damping is negative, the hand gets energy,
 unless it damps more than that itself. `--estimator difference` gives the wall of the theory, and `--arm` measures the whole
 servo step with an emulated device. `--log DIR` measures the wall in a recording ([log](log.md)) of a hand that moves to and fro

@@ -67,7 +67,7 @@ struct NoStabiliser {
 };
 
 /// The servo's side of a `PortLoop`: the servo's own ledger, limits, velocity and order of the
-/// output stage (docs/theory.md 5.4). `loop` and `stabiliser` outlive it.
+/// output stage (docs/forces.md 5.4). `loop` and `stabiliser` outlive it.
 template <class N, class Stabiliser>
 class PortServo {
  public:

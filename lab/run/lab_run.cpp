@@ -91,8 +91,10 @@ void LabOutput::write_report(const std::vector<std::string>& words, const std::s
   if (!is_stream(path_)) out << path_ << ": written\n";
 }
 
-void LabOutput::write_part(const char* name, const std::string& text) const {
-  if (!path_.empty()) guarded(option_, [&] { write_page_part(path_, name, text); });
+void LabOutput::write_part(const char* name, const std::string& text, std::ostream& out) const {
+  if (path_.empty()) return;
+  guarded(option_, [&] { write_page_part(path_, name, text); });
+  if (!is_stream(path_)) out << path_ << ": written\n";
 }
 
 void LabOutput::check_distinct(std::initializer_list<const LabOutput*> outputs) {

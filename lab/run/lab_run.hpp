@@ -65,8 +65,9 @@ class LabOutput {
   /// The page or plot that `make_report` makes of `json`; prints the path of the file to `out`.
   void write_report(const std::vector<std::string>& words, const std::string& json,
                     std::ostream& out) const;
-  /// Writes one part of a page that others write to, too: see `write_page_part`.
-  void write_part(const char* name, const std::string& text) const;
+  /// Writes one part of a page that other commands write to, too (see `write_page_part`); prints
+  /// the path of the file to `out`.
+  void write_part(const char* name, const std::string& text, std::ostream& out) const;
 
   /// Throws `FileError` if two of a run's outputs are one file.
   static void check_distinct(std::initializer_list<const LabOutput*> outputs);

@@ -19,7 +19,7 @@ namespace kerf::zwidth {
 
 /// The force of a wall that is pressed in by delta at speed v outwards.
 enum class Law : std::uint8_t {
-  coupling,   ///< the servo's own (docs/theory.md 5.1): its damper grows with the spring
+  coupling,   ///< the servo's own (docs/forces.md 5.1): its damper grows with the spring
   linear,     ///< max(0, K delta - B v)
   two_sided,  ///< -K x - B v on both sides of the face: the loop of the exact boundary
   paper,      ///< the paper's pressure on the covered voxels, of the whole arm alone

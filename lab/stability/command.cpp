@@ -209,9 +209,10 @@ ZwidthCommand::ZwidthCommand(Arguments& program)
   app_.option("--cells", cells_, "for --portraits: stiffness:damping, as many as 12")
       .split_at_commas()
       .shown_as("K:B,...");
-  app_.option(
-          "--page", page_,
-          "measure and write docs/stability.md, its pictures in plots/ beside it; takes minutes")
+  app_.option("--page", page_,
+              "measure and write its part of docs/stability.md, its pictures in plots/ beside it; "
+              "takes "
+              "minutes")
       .shown_as("FILE");
   app_.footer(
       "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count), in any order. "
@@ -394,8 +395,9 @@ void ZwidthCommand::write_page(std::ostream& out) const {
       make_report({"stability", "measure"}, order.canonical(), ReportErrors::shown);
   as_devices.write_report({"stability", "devices"}, measured, out);
   as_rates.write_report({"stability", "rates"}, measured, out);
-  as_page.write_report({"stability", "page", page_link(page_, devices), page_link(page_, rates)},
-                       measured, out);
+  const std::string part = make_report(
+      {"stability", "page", page_link(page_, devices), page_link(page_, rates)}, measured);
+  as_page.write_part("stability", part, out);
 }
 
 bool ZwidthCommand::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,

@@ -59,7 +59,8 @@ class EnergyCommand final : public LabCommand {
 EnergyCommand::EnergyCommand(Arguments& program)
     : LabCommand(program, "energy", "work at the device port, and what stabilisers cost") {
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
-  app_.option("--page", page_, "write the figures as a page (docs/energy.md)").shown_as("FILE");
+  app_.option("--page", page_, "write the figures as their part of a page (docs/stability.md)")
+      .shown_as("FILE");
   app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
   app_.footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
 }
@@ -75,7 +76,7 @@ int EnergyCommand::run(std::ostream& out) const {
   const std::string report = json_of(loops, feels, costs);
   out << make_report({"energy", "tables"}, report);
   as_json.write(report);
-  as_page.write_report({"energy", "page"}, report, out);
+  if (!page_.empty()) as_page.write_part("energy", make_report({"energy", "page"}, report), out);
   return std::ranges::all_of(loops, [](const LoopWork& row) { return row.share <= row.most_share; })
              ? 0
              : 1;

@@ -17,7 +17,7 @@ def _by_arm(what, value, arms):
 class Loop(_kerf.Loop):
     """A servo with its emulated device and the hand that holds it, in lock-step: the run of ./kerf demo --virtual, to the bit.
 
-    scene: kerf.Scene, or what kerf.Scene takes. hand: a TOML file of docs/script-keys.md, or a name in scenes/hands; None: the
+    scene: kerf.Scene, or what kerf.Scene takes. hand: a TOML file of docs/scene-keys.md, or a name in scenes/hands; None: the
     scene's own. faults: a fault script of the same page. With two arms both may be lists. law: see `law`. log: a new folder, for a
     recording of every tick, which close() ends.
 

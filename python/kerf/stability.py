@@ -103,7 +103,7 @@ def impedance(stiffness_n_per_mm, damping_ns_per_mm=0.0, device="omni", *, rate_
               amplitude_mm=0.5):
     """Wall and port as a hand feels them that moves the tip as a sine within the wall: the theory's rows of `kerf lab impedance`.
 
-    The wall is the linear one with the backward difference (docs/theory.md 5.8). device, rate_hz, direction: whose loop, map_loop,
+    The wall is the linear one with the backward difference (docs/forces.md 5.8). device, rate_hz, direction: whose loop, map_loop,
     unless `loop`, a kerf.SampledLoop, is given. hz: frequencies; if None, 100 of them from 1 Hz to half of the Nyquist frequency.
     amplitude_mm: of the motion, in which Coulomb friction counts. Returns a kerf.Impedance. Raises kerf.Error."""
     loop = loop if loop is not None else map_loop(device, rate_hz, direction)

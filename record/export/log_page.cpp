@@ -176,7 +176,7 @@ column, `/ticks/COLUMN`, with `units`, `description` and `valid` as attributes, 
 a second device's. `/scene` is the scene's JSON, in ASCII: other characters are `\uXXXX`. `/ticks/time_ns` is each row's time, UTC
 or with `--time monotonic` `start_ns`; the file's attribute `clock` says which.
 
-A running controller can be plotted without a log: [Foxglove](other-programs.md#foxglove) by the bridge, and PlotJuggler's UDP server
+A running controller can be plotted without a log: [Foxglove](compatibility.md#foxglove) by the bridge, and PlotJuggler's UDP server
 (protocol JSON, timestamp from the message; a second device is in `kerf_2`) by
 
     ./kerf record live --udp 127.0.0.1:9870

@@ -8,7 +8,7 @@
 
 namespace kerf {
 
-/// Where the work at the device port goes to or comes from (docs/theory.md 5.5): the columns of the
+/// Where the work at the device port goes to or comes from (docs/forces.md 5.5): the columns of the
 /// tick record, in its order. Their sum is the work that the loop took from the hand.
 enum class EnergySource : std::uint8_t {
   spring,     ///< the virtual coupling, or the contact force of another law: as if never sampled

@@ -20,7 +20,7 @@ struct HeatingSpindle {
 };
 
 /// How much warmer the pulp of the tooth under the bur is than the body: a mark of a preparation,
-/// which no force depends on. The tooth is one lump (docs/theory.md 6.7):
+/// which no force depends on. The tooth is one lump (docs/forces.md 6.7):
 ///
 ///   d(rise)/dt = kPerJ P - (rise - (T_water - T_body)) / kWaterS
 ///

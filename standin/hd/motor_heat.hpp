@@ -13,7 +13,7 @@
 namespace kerf::hd {
 
 /// One winding per joint, of first order in its torque: dQ/dt = (torque^2 - Q) / kWindingS, the
-/// model of the controller's budget (docs/theory.md 5.4). The temperature is Q over that of a
+/// model of the controller's budget (docs/forces.md 5.4). The temperature is Q over that of a
 /// torque that the motor may give for ever, 0 to 1. The vendor's prediction is not published.
 class MotorHeat {
  public:

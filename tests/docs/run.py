@@ -39,8 +39,8 @@ NOT_HERE = {
     "builds with KERF_PYTHON; the examples run in the test python_page": ["python.md: "],
     "needs compilers for other processors; .ci/all determinism runs its images": [".ci/packages.sh all"],
     "fetches and builds programs of others": ["tests/standin/others/run.sh"],
-    "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake",
-                                                "packages.md: python3 -m venv", "venv/bin/pip install"],
+    "runs in the tests packages and reader": ["./kerf package", "compatibility.md: cmake",
+                                                "compatibility.md: python3 -m venv", "venv/bin/pip install"],
     "needs a CT that does not come with kerf; the test examples_scenes brings it": [
         "./kerf demo --scene scenes/spine/", "./kerf demo --scene scenes/skull",
         "./kerf volume import /usr/share", './kerf volume import "$KERF_DATA'],
@@ -155,7 +155,7 @@ def run_page(page, root, bin_folder):
         environment.pop("DISPLAY", None)
         environment.pop("WAYLAND_DISPLAY", None)
         furnish(folder, root, bin_folder)
-        if page.name == "ci.md":  # a scene that its reader has
+        if page.name == "stand-ins.md":  # a scene that its reader has
             shutil.copy(root / "scenes" / "touch.toml", folder / "mine.toml")
             os.symlink(root / "scenes" / "hands", folder / "hands")
         for number, command, expected in todo:

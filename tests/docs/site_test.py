@@ -25,7 +25,7 @@ MOST_ROWS = 20  # of README's table of pages; the site has the rest
 NAMES = {"README": "start", "overview": "index"}  # pages of another name on the site
 # What a reader types, and the section that must come among the first three.
 NARROW = 390  # pixels of a phone
-SEARCHES = [("zigzag_mm", "script-keys.html#hands"), ("exit codes", "reports.html#exit-codes"),
+SEARCHES = [("zigzag_mm", "scene-keys.html#hands"), ("exit codes", "reports.html#exit-codes"),
             ("mouse pointer wheel", "window.html#a-hand-without-a-device-pointer-keys-gamepad-spacemouse"),
             ("threshold tissue HU", "own-volume.html#your-own-volume"),
             ("omni encoder wire", "wire.html#omni"), ("state_head", "api.html#segmentheader")]

@@ -246,7 +246,7 @@ TEST_CASE("the limits of the scene hold for a program too") {
     const float now_n = tick.commanded_force_n[1];
     CHECK(std::abs(tick.contact_force_n[1]) <= 255);
     CHECK(std::abs(now_n) <= 2.0F);
-    // A force that would push the hand away faster may end at once (docs/theory.md 5.4).
+    // A force that would push the hand away faster may end at once (docs/forces.md 5.4).
     CHECK(std::abs(now_n - last_n) <= std::max(0.51F, std::abs(last_n)));
     most_n = std::max(most_n, std::abs(now_n));
     last_n = now_n;

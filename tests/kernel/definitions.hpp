@@ -44,7 +44,7 @@ template <class N>
           gradient_from_sum<N>(z, tap.shift)};
 }
 
-// The definition of the method `aligned` (docs/theory.md 7.6), without tables: every fast path has
+// The definition of the method `aligned` (docs/forces.md 7.6), without tables: every fast path has
 // these bits. Overlap and removal are those of overlap.hpp and milling.hpp. Fixed point only.
 
 /// The exact tap sum of a voxel, inside or outside the volume (density outside is 0): its gradient

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-// One axis at a wall, written a second time from docs/theory.md 5.1, 5.2, 5.4 and docs/stability.md
+// One axis at a wall, written a second time from docs/forces.md 5.1, 5.2, 5.4 and docs/stability.md
 // alone: it includes nothing of kerf, and shares neither mechanics (small steps, stiction after
 // Karnopp) nor arithmetic (double) nor a verdict with the loop that the maps run. A truth for it,
 // many times as slow.
@@ -28,7 +28,7 @@ struct Press {
   double push_n, hit_mm_per_s, start_mm;
 };
 
-/// The velocity of a row of readings, the newest last (docs/theory.md 5.2).
+/// The velocity of a row of readings, the newest last (docs/forces.md 5.2).
 class Windowing {
  public:
   Windowing(const Axis& axis, double reading_mm)

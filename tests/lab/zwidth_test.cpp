@@ -848,7 +848,7 @@ TEST_CASE("without damping the first stiffness is that at which half the peak ou
     values[index_of(AxisId::delay)] = arm.delay;
     values[index_of(AxisId::damping)] = "0";
     const SampledLoop loop = subject_of(values).loop;
-    // docs/theory.md 5.7, in N, m and s.
+    // docs/forces.md 5.7, in N, m and s.
     const double late_s = loop.period_s / 2 + loop.delay_s, b = 1000 * loop.viscous_ns_per_mm;
     const double r =
         8 / std::numbers::pi * loop.coulomb_n / LimitSettings().force_n * std::sqrt(loop.mass_kg);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""reader_test.py ROOT BIN: kerf_reader installed by the lines of docs/packages.md, without a network, then against a real run: the same
+"""reader_test.py ROOT BIN: kerf_reader installed by the lines of docs/compatibility.md, without a network, then against a real run: the same
 rows from segment and log, the same voxels as in the controller's own file, one line for what is not there.
 
 Exit code 77: skipped, for want of numpy, setuptools, venv or wheel."""
@@ -27,14 +27,14 @@ os.chdir(home.name)
 os.environ["XDG_RUNTIME_DIR"] = home.name
 subprocess.run(["cp", "-r", root / "python", "python"], check=True)
 # The page's own lines, where no network answers.
-page = (root / "docs" / "packages.md").read_text(encoding="utf-8")
+page = (root / "docs" / "compatibility.md").read_text(encoding="utf-8")
 install = re.search(r"\n    (python3 -m venv .*)\n    (venv/bin/pip .*)\n", page)
 environment = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
 environment.update(PATH=f"{os.path.dirname(sys.executable)}:{os.environ['PATH']}", PIP_CONFIG_FILE=os.devnull, HOME=home.name,
                    https_proxy="http://127.0.0.1:9", http_proxy="http://127.0.0.1:9")
 for line in install.groups():
     done = subprocess.run(["bash", "-c", line], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    assert done.returncode == 0, f"docs/packages.md: {line}: {done.stdout}"
+    assert done.returncode == 0, f"docs/compatibility.md: {line}: {done.stdout}"
 sys.path[:0] = map(str, pathlib.Path("venv").resolve().glob("lib/python3*/site-packages"))
 import kerf_reader  # noqa: E402
 from kerf_reader import Log, Segment, SegmentError, layout  # noqa: E402

@@ -442,12 +442,12 @@ TEST_CASE("every row: the unit is the one that its name tells") {
   }
 }
 
-TEST_CASE("docs/scene-keys.md is what the table says") {
+TEST_CASE("docs/scene-keys.md begins with what the table says") {
   std::ifstream file(KERF_DOCS "/scene-keys.md", std::ios::binary);
   const std::string page{std::istreambuf_iterator<char>(file), {}};
-  INFO("renew it: ./kerf controller --scene-keys > docs/scene-keys.md");
+  INFO("renew it: tests/docs/reference/make.py . build/release/bin write");
   const LawRow* own = std::exchange(first_own_law, nullptr);
-  CHECK((page == scene_keys_page()));
+  CHECK(page.starts_with(scene_keys_page()));  // behind it are the keys of other files
   first_own_law = own;
   CHECK(has(scene_keys_page(), "`law = { name = \"nothing\" }`: gives no force.\n"));
   const VoxelGrid grid = PhantomSpec{}.grid;

@@ -23,7 +23,7 @@ TEST_CASE("a slow hand feels the stiffness, and the damping less that of hold an
   }
 }
 
-// docs/theory.md 5.8: by the sum over all aliases of a motion, of a delay of whole periods.
+// docs/forces.md 5.8: by the sum over all aliases of a motion, of a delay of whole periods.
 TEST_CASE("the damping that a passive wall needs is that of its least damped sine") {
   for (const double delay : {0.0, 1.0, 3.0}) {
     for (const double filter_s : {0.0, 0.002}) {

@@ -90,7 +90,7 @@ std::vector<Density> ball(const BallStage& stage, double noise) {
 }
 
 /// Half a ball milled out of a block. A tool that stays takes voxels of overlap c down to exp(-k
-/// c): those that it covers by more than a little are empty, all others full (docs/theory.md 7.5).
+/// c): those that it covers by more than a little are empty, all others full (docs/forces.md 7.5).
 std::vector<Density> hollow(const BallStage& stage) {
   constexpr double kDwell = 30.0;
   return stage.filled([&](const glm::dvec3& at) {

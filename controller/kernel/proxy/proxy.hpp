@@ -170,7 +170,7 @@ struct ProxyContact {
 inline constexpr double kLostDepth = 1;  // units
 
 /// Sets normal and moment arm of the contact: the sum of the loads, and its moment over the length
-/// of the spring (docs/theory.md 5.3). Friction acts at the points of the loads.
+/// of the spring (docs/forces.md 5.3). Friction acts at the points of the loads.
 ///
 /// The part of the spring beyond the loads and the friction cone is carried by planes that this
 /// tick did not meet (docs/theory.md 4.5). So a tool at rest, where forces balance, always has a

@@ -40,7 +40,7 @@ void gather(const SampleTable& samples, const SamplePose& pose, const VoxelGrid&
   }
 }
 
-// Weight and loss of a group of voxels under the tool (docs/theory.md 6.2). cover_vector.hpp has
+// Weight and loss of a group of voxels under the tool (docs/forces.md 6.2). cover_vector.hpp has
 // the same bits.
 
 /// Position of voxel `number` along one axis beside the spindle, clamped to one rim radius (2^20)

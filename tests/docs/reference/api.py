@@ -98,7 +98,7 @@ def page(root, _programs):
     headers = "\n".join(f"### kerf/{name}\n\n`#include \"kerf/{name}\"`\n\n```cpp\n{declarations(root, name)}\n```\n" for name in HEADERS)
     return f"""# Interfaces for C++, C and Python
 
-[Packages](packages.md#below-a-prefix-for-your-own-programs) has the build of a program that uses the headers, [Python](python.md) has
+[Packages](compatibility.md#below-a-prefix-for-your-own-programs) has the build of a program that uses the headers, [Python](python.md) has
 examples. Only what stands here is promised to stay within a version.
 
 ## C++ and C
@@ -106,7 +106,7 @@ examples. Only what stands here is promised to stay within a version.
 {headers}
 ## Python: import kerf
 
-`TICK` is the dtype of a row, with the columns of [the log](log.md). `Segment` is that of [kerf_reader](packages.md#python).
+`TICK` is the dtype of a row, with the columns of [the log](log.md). `Segment` is that of [kerf_reader](compatibility.md#python).
 `Error`, a `ValueError`, has one line: location, value, remedy.
 
 {python}"""

@@ -110,7 +110,7 @@ def segment(root, programs):
     return f"""# The shared segment
 
 What the controller writes and every reader maps, read-only: layout {file.number('kLayoutMajor')}.{file.number('kLayoutMinor')}, little-endian, natural alignment, offsets
-instead of pointers. An installed kerf and `python/kerf_reader` have readers ([packages](packages.md)). The
+instead of pointers. An installed kerf and `python/kerf_reader` have readers ([installation](compatibility.md#installation)). The
 magic is `KERFSHM1`. `abi_hash` is a hash of the layout below: a reader with another hash refuses the segment.
 
 The controller named NAME listens at `$XDG_RUNTIME_DIR/kerf/NAME.sock`, else `/tmp/kerf-$UID/NAME.sock`. NAME

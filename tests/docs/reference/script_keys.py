@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/script-keys.md: what the files of hands, of faults and of opacities may say."""
+"""The part of docs/scene-keys.md on other files: what the files of hands, of faults and of opacities may say."""
 import re
 
 from source import Source, same, same_defaults, table

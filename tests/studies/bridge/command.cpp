@@ -192,7 +192,7 @@ int TwoMachinesCommand::run(std::ostream& out) const {
   if (wanted("stopped")) table.stopped();
   if (wanted("publish") && !quick_) table.publish();
   if (wanted("crowd")) table.crowd();
-  page.write_part("bridge", table.text() + "\n" + lab_provenance() + "\n");
+  page.write_part("bridge", table.text() + "\n" + lab_provenance() + "\n", out);
   return table.held() ? 0 : 1;
 }
 

@@ -187,7 +187,7 @@ ContactCommand::ContactCommand(Arguments& program)
   app_.flag("--quick", quick_, "a hundredth of the cases");
   app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");
   app_.option("--page", page_,
-              "write all as a page (docs/contact.md), its plots in plots/ beside it")
+              "write all as its part of a page (docs/contact.md), the plots in plots/ beside it")
       .excludes(only)
       .shown_as("FILE");
   app_.option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
@@ -233,8 +233,9 @@ int ContactCommand::run(std::ostream& out) const {
   if (!page_.empty()) {
     as_plot.write_report({"contact", "plot"}, report, out);
     as_hands_plot.write_report({"contact", "hands"}, report, out);
-    as_page.write_report({"contact", "page", page_link(page_, plot), page_link(page_, hands_plot)},
-                         report, out);
+    const std::string part = make_report(
+        {"contact", "page", page_link(page_, plot), page_link(page_, hands_plot)}, report);
+    as_page.write_part("contact", part, out);
   }
   return std::ranges::all_of(findings.rows, &Row::pass) ? 0 : 1;
 }
