@@ -204,14 +204,15 @@ CONTRAST = """(() => {
 
 
 def faults_of_formulas(site):
-    """Those of theory.md are MathML, and none is left as text; a page that is named is a link."""
-    text = (site / "theory.html").read_text(encoding="utf-8")
-    formulas = re.findall(r"<math>(.*?)</math>", text)
-    if len(formulas) < 30 or any(one.count("<m") != one.count("</m") + one.count("/>") for one in formulas):
-        yield f"theory.html: {len(formulas)} formulas, or one that does not close"
-    bare = re.sub(r"<pre>.*?</pre>|<code>.*?</code>|<math>.*?</math>", "", text, flags=re.S)
-    bare = bare.partition('role="main">')[2].partition("<footer")[0]
-    yield from (f"theory.html: a formula as text: {found}" for found in re.findall(r".{20}(?:\w\^|\w_[\w{]|<=|\bSUM\b).{10}", bare))
+    """Those of the pages of theory are MathML, and none is left as text; a page that is named is a link."""
+    for page in ("theory.html", "forces.html"):
+        text = (site / page).read_text(encoding="utf-8")
+        formulas = re.findall(r"<math>(.*?)</math>", text)
+        if len(formulas) < 15 or any(one.count("<m") != one.count("</m") + one.count("/>") for one in formulas):
+            yield f"{page}: {len(formulas)} formulas, or one that does not close"
+        bare = re.sub(r"<pre>.*?</pre>|<code>.*?</code>|<math>.*?</math>", "", text, flags=re.S)
+        bare = bare.partition('role="main">')[2].partition("<footer")[0]
+        yield from (f"{page}: a formula as text: {found}" for found in re.findall(r".{20}(?:\w\^|\w_[\w{]|<=|\bSUM\b).{10}", bare))
     for file in site.glob("*.html"):
         page = re.sub(r"<a [^>]*>.*?</a>|<pre>.*?</pre>", "", file.read_text(encoding="utf-8"), flags=re.S)
         yield from (f"{file.name}: {name}: is named and no link" for name in re.findall(r"<code>(docs/[\w-]+\.md)</code>", page))

@@ -37,7 +37,7 @@ def demoted(text, title):
 FILES = {
     "docs/api.md": lambda *where: page(api.page(*where) + demoted(layouts.segment(*where), "The shared memory")),
     "docs/scene-keys.md": lambda root, programs: (
-        programs.said(programs.folder / "kerf-controller", "--scene-keys") +
+        programs.said(programs.folder / "kerf-controller", "--scene-keys") + "\n" +
         demoted(script_keys.page(root, programs), "Hand, fault, opacity and camera files")),
     "docs/wire.md": lambda *where: page(wire.page(*where)),
     "docs/reports.md": lambda *where: page(f"{reports.page(*where).rstrip()}\n\n{exit_codes.section(*where)}"),
