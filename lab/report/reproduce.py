@@ -326,20 +326,27 @@ def energy_panels(kerf):
 HEAD = """\
 # Held against published numbers
 
-`./kerf lab reproduce --page docs/reality.md` makes this page: each number of the column `kerf` comes from a run of kerf's own code,
-none is typed in. A *match* is within the tolerance of its row. A *miss* is printed and explained, never left out. A row is *shown*
-without a verdict if its source leaves out something that a verdict needs. If a parameter is not published, only orders, exponents
-and directions are compared, so a match of such a row says no more than that.
+`./kerf lab reproduce --page docs/reality.md` makes this page. Each number in the column `kerf` comes from a run of kerf's code; none
+is typed in.
 
-Nothing here was measured on a device. Most sources were read as abstracts or as quoted by others; [Sources](#sources) has what was
-read of each.
+* A *match* is within the tolerance of its row.
+* A *miss* is printed and [explained](#the-misses), never left out.
+* A row is *shown* without a verdict if its source does not publish something that a verdict needs.
+
+If a parameter is not published, only orders of magnitude, exponents and directions are compared, and a match means no more than that.
+
+Nothing here was measured on a device. Of most sources only the abstract, or a quotation in another work, was read;
+[Sources](#sources) lists what was read of each.
+
+In the tables K is the stiffness of the wall and B its damping; b and f are the viscous damping and the Coulomb friction of the device;
+D is the encoder step and T the period of the servo.
 
 """
 
 ADD = """\
 ## Add a row
 
-A row is one TOML table; `lab/report/reproduce.toml` has those of this page. A file of your own takes part by `--rows`:
+A row is one TOML table. `lab/report/reproduce.toml` has the rows of this page. Write your rows to another file and name it with `--rows`:
 
     functions = "mine.py"   # only if a row needs a function that lab/report/reproduce_rows.py does not have
 
@@ -360,10 +367,14 @@ A row is one TOML table; `lab/report/reproduce.toml` has those of this page. A f
     compare = "within 10 %"
     held = "mass, damping and rate of the paper"
 
-`compare` is `within N %`, `within a factor of N`, `within N`, `at least` or `at most` (kerf's number against the published one), `equal`
-for texts, or `shown`. `unknown` names what the source leaves out, and then no percentage is allowed. `why` explains a miss; a miss
-without it ends the command with 1. A function gets `kerf` and the parameters, which for maps are the options of
-`./kerf lab zwidth --help`, and is marked with the unit of its number:
+* `compare` is `within N %`, `within a factor of N`, `within N`, `at least` or `at most` for numbers, `equal` for texts, or `shown`.
+  With `at least`, kerf's number must be at least the published number.
+* `unknown` names the parameters that the source does not publish. A row with `unknown` may not have `within N %`.
+* `why` explains a miss. A miss without `why` makes the command end with exit code 1.
+* `function` is a Python function that gets `kerf` and the row's `parameters`. For maps the parameters are the options of
+  `./kerf lab zwidth --help`.
+
+A file of functions marks each function with the unit of its number:
 
     from reproduce_rows import gives, linear_stiffness
 
@@ -372,7 +383,7 @@ without it ends the command with 1. A function gets `kerf` and the parameters, w
         return linear_stiffness(kerf, **axes) / 2
 
     ./kerf lab reproduce --rows mine.toml               # prints the rows
-    ./kerf lab reproduce --only chai3d,isaac-lab        # of these sources alone
+    ./kerf lab reproduce --only chai3d,isaac-lab        # only the rows of these sources
 
 """
 
@@ -448,17 +459,22 @@ def page(data, regions_link, energy_link):
 
 
 REGIONS = """\
-The axes are those of Diolaiti et al.: damping b over K T, and friction f over K times the encoder step D. Each square is two runs
-against a spring wall of 1 N/mm (0.1 kg, 1 kHz, steps of 0.1 mm, no delay, exact numbers, no limits): a push of 0.05 N on the wall's
-face, and a hit at 200 mm/s with 1 N. Right of b/(KT) = 1/2 and above f/(KD) = 1/2 the wall is passive. Left of it and above f/(KD) =
-1/2 the wall is not passive, and the tip settles all the same: friction dissipates the energy that sampling adds. Below f/(KD) = 1/2
-friction does not hold the force of one encoder step, and whether the tip settles depends on the press.
+The axes are those of Diolaiti et al.: damping b over K T, and friction f over K times the encoder step D. Each square stands for two
+runs against a spring wall of 1 N/mm: a push of 0.05 N from the wall's surface, and a hit at 200 mm/s with 1 N. The two runs are the
+presses in the tables below. Both have 0.1 kg, 1 kHz, encoder steps of 0.1 mm, no delay, exact numbers and no limits.
+
+* Right of b/(KT) = 1/2 and above f/(KD) = 1/2 the wall is passive.
+* Left of b/(KT) = 1/2 and above f/(KD) = 1/2 the wall is not passive. The tip still settles, because friction dissipates the energy
+  that sampling adds.
+* Below f/(KD) = 1/2 friction does not hold the force of one encoder step. Near this line the tip settles after one or both of the
+  presses, and far below it after neither.
 
 """
 
 ENERGY = """\
-The energy that the port has taken from the hand, from the true work of the motors: below 0 the wall has given energy. A mass of 0.1 kg with
-0.2 N s/m falls onto the wall from 1 mm with 1 N. Observer and controller are those of the servo (docs/forces.md 5.6), at 1 kHz.
+The curves show the energy that the device port has taken from the hand, computed from the true work of the motors. Below 0 the wall
+has given energy to the hand. A force of 1 N pushes a mass of 0.1 kg with damping of 0.2 N s/m onto the wall from a distance of 1 mm.
+Observer and controller are the servo's (docs/forces.md 5.6), at 1 kHz.
 
 """
 
@@ -467,8 +483,8 @@ def regions(data):
     import figure as fig
     from matplotlib.patches import Patch, Rectangle
     plane = data["regions"]
-    colours = {("rests", "rests"): ("#CFE8DC", "rests after both"), ("rests", "other"): ("#F7E3A1", "rests after the light push alone"),
-               ("other", "rests"): ("#B8B4DC", "rests after the hit alone"), ("other", "other"): ("#F0B79B", "rests after neither")}
+    colours = {("rests", "rests"): ("#CFE8DC", "settles after both"), ("rests", "other"): ("#F7E3A1", "settles after the push only"),
+               ("other", "rests"): ("#B8B4DC", "settles after the hit only"), ("other", "other"): ("#F0B79B", "settles after neither")}
     picture, axes = fig.new_figure(760, 560, left=75, right=25, top=45, bottom=110)
     axes = axes[0][0]
     half = (plane["beta"][1] - plane["beta"][0]) / 2

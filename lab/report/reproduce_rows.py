@@ -157,11 +157,11 @@ def contact(kerf, figure, **figures):
 
 @gives("text")
 def contact_outcome(kerf, settled_mm=0.001, **figures):
-    """never touches, settles, swings or diverges."""
+    """never touches, settles, oscillates or diverges."""
     run = kerf.probe("contact", **figures)
     if run["peak_n"] == 0:
         return "never touches"
-    return "diverges" if run["ended_early"] else "settles" if run["swing_mm"] < settled_mm else "swings"
+    return "diverges" if run["ended_early"] else "settles" if run["swing_mm"] < settled_mm else "oscillates"
 
 
 @gives("mJ")

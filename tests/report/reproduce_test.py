@@ -234,7 +234,7 @@ class Reproduce(unittest.TestCase):
                  "cells": [{"beta": b, "sigma": s, "light": "rests", "hard": "swings"} for b in (0.4, 0.6) for s in (0.4, 0.6)]}
         curve = {"label": "alone", "s": [0, 1], "port_mj": [0, -100], "observed_mj": [0, -1]}
         data = {"regions": plane, "energy": {"panels": [{"title": "a wall", "curves": [curve, curve]}]}}
-        for plot, part in ((reproduce.regions, "rests after the light push alone"), (reproduce.energy, "energy taken by the port (mJ)")):
+        for plot, part in ((reproduce.regions, "settles after the push only"), (reproduce.energy, "energy taken by the port (mJ)")):
             picture = plot(data)
             self.assertEqual(xml.fromstring(picture).tag, "{http://www.w3.org/2000/svg}svg")
             self.assertIn(part, picture)
