@@ -31,176 +31,190 @@ if not os.path.isdir(os.path.join(ROOT, "examples")):
 ABOUT = """\
 # Stability
 
-Made by `./kerf lab zwidth --page docs/stability.md`; every figure comes from one run, nothing is typed by hand. The
-same seed gives the same bytes on any number of cores. docs/forces.md 5.7 derives the analytic limits, 5.1 the force
-of the wall.
+Made by `./kerf lab zwidth --page docs/stability.md`: all maps come from one run. The same seed gives the same bytes on any
+number of cores. docs/forces.md derives the force of the wall (5.1) and the analytic limits (5.7).
 
 The Z-width of a device is the range of stiffness K that it can render, from free air to the stiffest stable wall. A
-sampled wall adds a little energy in every tick; damping of device, wall and hand removes it. Above some K more is added
-than removed, and the tip oscillates.
+sampled wall adds a little energy in every tick. Friction and damping of device, wall and hand remove energy. Above some
+K the wall adds more than they remove, and the tip oscillates.
 
-Each cell of a map is a simulated device at a flat wall, without a hand unless stated. A *press* is one run of such a cell: the tip
-starts at a distance from the wall with a speed, and a constant force above friction pushes it on. Each stiffness gets three
-standard presses (0.5 N from 0.1 mm at 0, 50 and 200 mm/s) and two presses of a sequence. Over all stiffnesses the sequence
-covers evenly the pushes from 0.05 N to 0.9 of the peak force, speeds up to 500 mm/s and distances up to 2 mm. All presses
-are repeated for each seed, and a cell has the worst verdict of all. `--push`, `--hit` and `--start` fix the push, the speed
-and the distance; a list of values makes one of them an axis of the map.
+Each cell of a map is a simulated device at a flat wall. No hand holds the device unless stated. A *press* is one run of a
+cell: the tip starts at a distance from the wall, with a speed, and a constant force above friction pushes it on. Each
+stiffness gets five presses for each seed:
 
-The verdicts, by the names of their columns:
+* three standard presses: 0.5 N from 0.1 mm, at 0, 50 and 200 mm/s;
+* two presses of a sequence. Over all stiffnesses the sequence covers evenly the pushes from 0.05 N to 0.9 of the peak
+  force, speeds up to 500 mm/s and distances up to 2 mm.
 
-* *rests* (settles): proven for each run. Either friction holds the tip under a constant force for longer than the memory of
-  the loop, or in the last half of the run the travel is at most one encoder step and the motors give at most the energy of
-  a push over it. A loop without encoder steps settles if the travel is at most 0.0001 mm.
-* *swings* (oscillates): the last half of a run has eight windows. In the first four and in the last four of them the tip
-  reverses at least twice, each time after more than one encoder step, and its travel does not decrease from each window to
-  the next. A creeping tip does not reverse, so it does not count as oscillating.
-* *active*: in the first four windows and in the last four the motors give more energy than a push over one encoder step
-  takes, and neither the travel nor this energy decreases from each window to the next.
-* *arithmetic*: only the rounding of fixed-point numbers keeps up a motion. The loop has no encoder steps, the travel is below
-  1 µm, and the same runs settle in double. It counts as stable.
-* *undecided*: any other cell.
+A cell has the worst verdict of its presses. `--push`, `--hit` and `--start` fix the push, the speed and the distance. A
+list of values makes one of them an axis of the map.
+
+The verdicts (all except the first are columns of `--csv`):
+
+* *settles*: this is proven for each press, in one of two ways. Either friction holds the tip, under a constant force, for
+  longer than the loop remembers earlier motion. Or, in the last half of the run, the travel is at most one encoder step
+  and the motors give at most the energy of the push over one step. Without encoder steps 0.0001 mm replaces the step.
+* *swings* (oscillates): the last half of a run has eight windows. In the first four, and again in the last four, the tip
+  reverses at least twice, each time after more than one encoder step. If the travel falls from every window to the next,
+  the motion dies out and is no oscillation. A creeping tip does not reverse, so it does not count as oscillating.
+* *active*: in the first four windows, and again in the last four, the motors give more energy than a push over one encoder
+  step takes. A run is not active if the travel, or this energy, falls from every window to the next.
+* *arithmetic*: only the rounding of fixed-point numbers keeps the tip in motion. The loop has no encoder steps, the travel
+  is below 1 µm, and the same presses settle in double. The cell counts as stable.
+* *undecided*: neither settling nor oscillation is proven.
 
 How a map is searched:
 
-* A run ends when it is proven to have settled, else after 60 s, or later if mass and damping make the motion slower than that.
-  An oscillation with friction and encoder steps is chaotic: one run in a hundred stops only after 3 to 45 s. `--seconds`
-  makes the limit longer, never shorter, so no verdict depends on it.
-* *First* is the lowest K of a column at which a run of any seed oscillates or is active. The search goes upwards in steps of
-  1 %. Then presses near the bad one are tried 2 % lower, again and again until none of them is bad, and the last step is halved to
-  0.5 %. For the whole arm the search goes upwards in the steps of the map, and halves the last one to 0.5 %. Cells above
-  *first* are tried with the bad press, too. The picture has a bar from the lowest to the highest *first* of a single seed. Stable cells above are reported separately,
-  because a hand cannot reach them.
-* With friction the worst push is about half of the peak: the oscillation then has the most room between no force and the
-  peak, and friction takes the smallest part of a large oscillation (docs/forces.md 5.7).
-* There is no thermal limit: weaker motors would end an oscillation.
+* A run ends when the tip is proven to have settled, at the latest after 60 s. The limit is longer if mass and damping make
+  the motion slower. With friction and encoder steps an oscillation is chaotic: one run in a hundred stops only after 3 to
+  45 s. `--seconds` makes the limit longer, never shorter.
+* *First* is the lowest K of a column at which a run of any seed oscillates or is active. The search goes upwards in steps
+  of 1 % to the first bad press. Then it goes down by 2 %, again and again, as long as this press or a similar one is bad
+  there. The last step is halved to 0.5 %. For the whole arm the search goes upwards in the steps of the map, and halves the
+  last one to 0.5 %. Cells above *first* also get the bad press.
+* A picture has a bar from the lowest to the highest *first* of the seeds. Stable cells above *first* are reported
+  separately, as re-entry.
+* With friction the worst push is about half of the peak force. The oscillation then has the most room between no force
+  and the peak, and friction takes the smallest part of the energy of a large oscillation (docs/forces.md 5.7).
+* A map has no thermal limit, because the weaker force of hot motors would end an oscillation.
 
 A seed sets the phase of the encoder steps relative to the wall, which changes K by up to a factor of two for one press. It
-also sets the start of the sequence of presses. Seeds are the same in every column, so that two columns differ by their axes
-alone. `--seed` is the first seed, `--seeds` their number, 5 unless given.
+also sets the start of the sequence of presses. All columns use the same seeds, so two columns differ by their axes alone.
+`--seed` is the first seed, and `--seeds` the number of seeds, 5 by default.
 
-*One axis* runs the servo's own coupling, velocity estimator, stabilisers and force limits, as the same templates and in
-the loop's numbers, with exact mechanics. *Whole arm* (`--arm`) runs the servo step with the emulated device, its driver
-and its packets in virtual time; it also slides onto the flat and hits the corner of three walls, and has one press of
-the sequence at each stiffness. The mechanics are plausible values, not those of a unit. For your device, give `--mass`,
-`--viscous`, `--friction` and `--quantum`, or the file of `./kerf identify` ([gains](gains.md#identify-your-device)).
+*One axis*, the default, runs the servo's own coupling, velocity estimator, stabilisers and force limits: the same
+templates, in the number type of the loop, with exact mechanics of the device. *Whole arm* (`--arm`) runs the servo step
+with the emulated device, its driver and its packets in virtual time. The arm also slides onto the flat and hits the corner
+of three walls. It has one press of the sequence at each stiffness.
+
+The mechanics are plausible values, not measured on a unit. For your device, give `--mass`, `--viscous`, `--friction` and
+`--quantum`, or the file of `./kerf identify` ([gains](gains.md#identify-your-device)).
 
 """
 
 DEVICES = """\
-The lowest K in N/mm that oscillates or is active, at two dampings B: the default, and the one with the highest K on the
-device's map.
+The table has the lowest K in N/mm that oscillates or is active. Each device has two dampings B: the default, and the one
+with the highest K on the device's map.
 
-* *Linear, exact* is the boundary of another loop: a linear two-sided wall with the backward difference, in double,
-  without friction, encoder steps and limits. In the picture it is a solid line in a map of that loop, and a dotted line in all others.
+* *Linear, exact* is the boundary of another loop: a linear two-sided wall with the backward difference as velocity, in
+  double, without friction, encoder steps and limits. It is a solid line in a picture of that loop, and dotted in all others.
 * The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
-* Each measured K is the lowest of five seeds; undecided counts as unstable. The whole arm has 14 stiffnesses.
-* *Safe K, emulated* is the minimum of the row over 1.5, for the emulated device alone. The margin covers phases and islands between two
-  steps that no run of the map met. Of 10,000 random presses at each of them none oscillates or is active (`zwidth_maps`, the
-  part `ranges` of `.ci/all`); a few in 180,000 are undecided: there the push plus twice the friction is the peak force, so the tip creeps out.
-* **Safe K, real unit**, in bold, is the highest stiffness of the row's device and B that `kerf controller --check` accepts without a warning at
-  1 kHz: **the one to use with a real device that nobody has measured**. It assumes a viscous damping of
-  0.0002 N s/mm, less than that of the emulator, and a delay of 2 ms in each row. It never exceeds the published maximum of the
-  device ([gains](gains.md)). *none*: B is above the published maximum.
-* The delay of a real device is not known; assume two periods until you measure it.
-* Take no more damping than the map shows as stable: beyond its maximum the lag of the velocity and the encoder steps
-  drive the oscillation.
+* Each measured K is the lowest of five seeds. Undecided counts as unstable. The map of the whole arm has 14 stiffnesses.
+* *Safe K, emulated* is the lowest K of the row divided by 1.5, for the emulated device alone. The margin covers phases, and
+  unstable islands between two steps, that no run of the map met. A test gives each of these 18 stiffnesses 10,000 random
+  presses (`zwidth_maps`, in the part `ranges` of `.ci/all`). No press of the 180,000 oscillates or is active. A few are
+  undecided: their push plus twice the friction is about the peak force, so the wall hardly moves the tip out.
+* **Safe K, real unit**, in bold, is **the one to use with a real device that nobody has measured**. It is the highest
+  stiffness that `./kerf controller --check` accepts without a warning at 1 kHz, for the device and B of the row. It assumes
+  a viscous damping of 0.0002 N s/mm, less than the emulator has, and a delay of 2 ms in each row. It never exceeds the
+  published maximum stiffness of the device ([gains](gains.md)). *none*: B is above the published maximum damping.
+* The delay of a real device is not known. Assume two periods until you measure it.
+* Do not use more damping than the damping with the highest stable K on the map. Beyond it, the lag of the velocity and the
+  encoder steps drive the oscillation.
 
 """
 
 STABILISERS = """
 ## Stabilisers
 
-The lowest unstable K with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping, as one axis / whole arm, of one seed.
-A stabiliser helps against a light push alone (`--push 0.5`) far more than against a hard one.
-[Energy](#the-effect-of-a-stabiliser-on-the-hand) has the effect on the hand. `passivity` accounts for a force in the tick that commands it. With a delay the force
-acts later, and the port may give far more energy than the account shows: `port_minimum_mj` of `--csv` has the lowest energy of the
-port in each cell. The first run that both oscillates and is active ends the search of its cell.
+The table has the lowest unstable K with B = 0.002 N s/mm, as one axis / whole arm, of one seed. The stabiliser has the
+mass and damping of the device. If all pushes are light (`--push 0.5`), a stabiliser helps far more than in this table,
+which includes hard pushes. [Energy](#the-effect-of-a-stabiliser-on-the-hand) has the effect on the hand.
+
+`passivity` books a force in the tick that commands it. With a delay the force acts later, so the port may give far more
+energy than the account shows. The column `port_minimum_mj` of `--csv` has the lowest energy of the port in each cell. A
+cell gets no further runs once it oscillates and is active, so this column does not include them.
 
 """
 
 RATES = """\
-By the linear theory, without friction, the boundary grows in proportion to the rate. The measured one grows less. Encoder
-steps are the same at every rate. The velocity window spans up to 16 ms at every rate, so at a high rate its lag is more
-periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns the damping is unstable without any wall.
+In the linear theory, without friction, the boundary grows in proportion to the rate. The measured boundary grows less.
+The encoder steps are the same at every rate. From 1 kHz on the velocity window spans up to 16 ms, so at a high rate its
+lag is more periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns the damping is
+unstable without any wall.
 
 """
 
 KNOBS = """\
 ## The effect of each parameter
 
-An Omni with B = 0.002 N s/mm and a delay of one period; one parameter changes at a time, the default is bold, K in N/mm.
-The linear boundary includes mass, both dampings, delay, rate, hand and filter. *Re-entry* is the lowest stable K above
-the first crossing. Five seeds, 40 stiffnesses from 0.05 to 50 N/mm.
+The device is an Omni with B = 0.002 N s/mm and a delay of one period. One parameter changes at a time; the default is
+bold. K is in N/mm. The linear boundary includes mass, both dampings, delay, rate, hand and filter. *Re-entry* is the
+lowest stable K above the first crossing. Five seeds, 40 stiffnesses from 0.05 to 50 N/mm.
 
 """
 
 NUMBERS = """
-The two differ if a run is chaotic. Near every boundary of a loop with friction and encoder steps it is: a difference of 2^-16 mm
-or N moves an encoder step to another tick, and with it the position at which the tip settles. Neither number type is better in
-general.
+The two number types differ if a run is chaotic. Near every boundary of a loop with friction and encoder steps the runs are
+chaotic. A difference of 2^-16 mm or N moves an encoder step to another tick, so the tip settles at another position.
+Neither number type is better in general.
 
 """
 
 FILES = """\
 ## Files of a map
 
-`--csv` has one row for each cell, with the axes as `--help` lists them, then the figures. A column that cannot exist has
-no rows.
+`--csv` has one row for each cell: first the axes, in the order of `--help`, then the figures. A column without cells has no
+rows: it cannot exist, or the hand never met the wall.
 
 | column | unit | meaning |
 |---|---|---|
-| loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits, push_n, hit_mm_per_s, start_mm | in the name | value of each axis, as given or the default; `any` for a push, speed or distance: searched |
+| loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits, push_n, hit_mm_per_s, start_mm | in the name | value of each axis, as given or the default; `any`: the push, speed or distance was searched |
 | stiffness_n_per_mm | N/mm | K of the cell |
-| swings, active, undecided, arithmetic | 0 or 1 | verdict of the worst run; a cell with four zeros is proven to settle |
-| travel_mm | mm | peak to peak in the last half of a run, the largest of all runs; 0: held by friction |
-| given_mj | mJ | energy that the motors gave in that half |
-| port_minimum_mj | mJ | lowest energy of the device port in a run that begins at 0 |
+| swings, active, undecided, arithmetic | 0 or 1 | verdict of the worst run; four zeros: the cell is proven to settle |
+| travel_mm | mm | peak-to-peak travel in the last half of a run, the largest of all runs; 0: friction holds the tip |
+| given_mj | mJ | energy that the motors give in the last half of a run, the largest of all runs |
+| port_minimum_mj | mJ | lowest energy of the device port; each run begins at 0 |
 
 `--json` has the whole map:
 
 | key | meaning |
 |---|---|
-| version, seed, seeds, seconds, whole_arm | version of the program, first seed, number of seeds, shortest time limit of a run, whether with `--arm` |
+| version, seed, seeds, seconds, whole_arm | version of the program, first seed, number of seeds, shortest time limit of a run, true: with `--arm` |
 | mapped, varied | axes of the picture; axes with several values |
 | stiffness_n_per_mm | stiffness of each cell of a column, N/mm |
-| columns | a list, one for each combination of the other axes, of the following |
+| columns | a list with one entry for each combination of axis values; each entry has the keys below |
 | axes | value of each axis as a text, by the names of the CSV |
-| impossible | reason for a column without cells; null: it has cells |
-| by_travel, by_energy | crossings by *swings* and *active*, each with the next four rows |
+| impossible | reason that the column cannot exist, else null; if the hand never met the wall, it is null and `cells` is empty |
+| by_travel, by_energy | first crossings by *swings* and by *active*, each with the keys of the next four rows |
 | first_n_per_mm, reason | lowest K of all seeds; or null, and the reason: `below all`, `above all`, `undecided` (no cell is bad, one is undecided), `not measured` |
-| last_n_per_mm, last_reason | the same of the seed that crosses last |
-| by_seed_n_per_mm, band_n_per_mm | lowest K of each seed, and the quantiles of 5 and 95 % over the seeds (use `--seeds 200`); null: none, or below all |
+| last_n_per_mm, last_reason | the *first* of the seed that crosses last, or null and the reason |
+| by_seed_n_per_mm, band_n_per_mm | lowest K of each seed, and its quantiles of 5 and 95 % over the seeds (use `--seeds 200`); null: no crossing, or below all |
 | re_entry_from_n_per_mm, re_entry_to_n_per_mm | range of K above the first crossing in which cells settle again; null: none |
 | undecided_from_n_per_mm | lowest K at which a run is undecided; null: none |
-| analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop, 0: nothing is stable, null: for another loop; exact_holds, passive_holds: whether this column's loop is the one of the bound |
-| cells | swings, active, undecided, arithmetic, travel_mm, given_mj, port_minimum_mj of each stiffness |
+| analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop; 0: no K is stable; null: there is no such bound. exact_holds, passive_holds: whether the bound is for the loop of this column |
+| cells | for each stiffness: swings, active, undecided, arithmetic, travel_mm, given_mj, port_minimum_mj |
 
 """
 
 QUESTION = """\
 ## Which stiffness, and how it feels
 
-Which K may a device render, for any push, in its worst direction, and what does a hand feel at 30 Hz? A map can take the
-device from a file; [`./kerf identify`](gains.md#identify-your-device) writes such a file for your device.
-`examples/devices/premium15.toml` is a Phantom Premium 1.5 by published figures. Its mass is a matrix: 2.6 times as heavy in one
-direction as in another. `worst` is the
-direction with the lowest stiffness that any push makes oscillate, by theory (docs/forces.md 5.7); `--direction 1,0,0.5`
-sets another one.
+Which K may a device render, for any push, in its worst direction? What does a hand feel at 30 Hz?
+
+A map can take the device from a file. [`./kerf identify`](gains.md#identify-your-device) writes such a file for your
+device. `examples/devices/premium15.toml` is a Phantom Premium 1.5 with published figures. Its mass is a matrix: in
+the heaviest direction it is 2.6 times as large as in the lightest. The map is of one direction, by default `worst`: by
+theory (docs/forces.md 5.7) a push makes the device oscillate at a lower stiffness there than in any other direction.
+`--direction 1,0,0.5` sets another one.
 
 """
 
 ANSWER = """
-So it may render {k} N/mm at B = {b} N s/mm, the lowest K over 1.5 as in the table above. The same wall over frequency:
+So it may render {k} N/mm at B = {b} N s/mm: the lowest K divided by 1.5, as in the table of devices. The next command
+measures the same wall at several frequencies:
 
 """
 
 FELT = """
-At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is stiffer and less damped than the wall of the theory
-(docs/forces.md 5.8), because `foaw` lags behind the difference that the theory has. At the device's port it feels
-{port_k} N/mm and {port_b} N s/mm, since the mass counts against the spring. Where the damping is negative, the hand gets energy,
-unless it damps more than that itself. `--estimator difference` gives the wall of the theory, and `--arm` measures the whole
-servo step with an emulated device. `--log DIR` measures the wall in a recording ([log](log.md)) of a hand that moves to and fro
-in it, faster and faster, like a chirp. `--plot` draws the figures.
+At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is stiffer and less damped than the wall of the
+theory (docs/forces.md 5.8), because `foaw` lags behind the backward difference of the theory. At the device's port the hand
+feels {port_k} N/mm and {port_b} N s/mm, because the inertia of the device counts as a negative stiffness. Where the damping
+is negative, the hand gets energy, unless its own damping takes more.
+
+`--estimator difference` gives the wall of the theory. `--arm` measures the whole servo step with an emulated device.
+`--log DIR` measures the wall in a recording ([log](log.md)): in such a recording a hand moves to and fro in the wall, faster
+and faster, like a chirp. `--plot` draws the figures.
 
 """
 
@@ -210,17 +224,17 @@ HOW = """\
     ./kerf lab zwidth --quick --plot zwidth.svg                   # the theory's loop and kerf's side by side
     ./kerf lab zwidth --rate 4000 --delay 0.5 --csv map.csv       # any axis takes a value, a list or a range
     ./kerf lab zwidth --map delay,quantum --delay 0:3:13 --quantum 0:0.2:11 --plot k.svg # the highest K as a colour
-    ./kerf lab zwidth --portraits portrait.svg --cells 1:0.002,10:0.002                  # position against speed; --arm too
-    ./kerf lab zwidth --arm --delay 0 --stiffness 0.1:50:40 --plot arm.svg               # the whole servo step; minutes
+    ./kerf lab zwidth --portraits portrait.svg --cells 1:0.002,10:0.002                  # speed over position; also with --arm
+    ./kerf lab zwidth --arm --delay 0 --stiffness 0.1:50:40 --plot arm.svg               # the whole servo step; takes minutes
     ./kerf lab zwidth --stabiliser none,passivity,energy_bounding --plot s.svg           # one panel for each
-    ./kerf lab zwidth --map push,stiffness --push 0.1:2.9:15 --damping 0.002 --plot p.svg # what is stable for a light push alone
+    ./kerf lab zwidth --map push,stiffness --push 0.1:2.9:15 --damping 0.002 --plot p.svg # the stable K of each push
     ./kerf lab zwidth --seeds 200 --damping 0.002 --map delay,stiffness --delay 0,1,2 --json band.json # K of each seed
 
 `--law`, `--estimator` and `--stabiliser` also take the laws that your own program registers (docs/own-law.md).
 
-A map larger than one machine is cut into shards. Each keeps its finished columns in a part file and goes on from there
-when it is started again; `--merge` refuses parts of other seeds, programs or axes, and names what is missing. `examples/cluster/zwidth.sbatch`
-is a job array of Slurm. With GNU parallel:
+A map that is too large for one machine is cut into shards. Each shard keeps its finished columns in a part file, and
+continues from there when it is started again. `--merge` refuses parts with other seeds, axes or another program, and names
+a missing part. `examples/cluster/zwidth.sbatch` is a job array of Slurm. With GNU parallel:
 
     parallel ./kerf lab zwidth --rate 250,500,1000,2000 --jobs 1 --shard {}/8 --part zwidth-{}.part ::: {1..8}
     ./kerf lab zwidth --merge zwidth-*.part --plot zwidth.svg --csv zwidth.csv --json zwidth.json
@@ -444,14 +458,14 @@ def page(data, devices, rates):
                          [[row["device"], row["delay"], *(" / ".join(map(first, row["lowest"][kind])) for kind in kinds)]
                           for row in data["stabilisers"]])
             + f"\n## Rates\n\n![Maps of six rates]({rates})\n\n" + RATES + KNOBS
-            + text.table(["parameter", ">value", ">swings from", ">active from", ">linear, exact", ">re-entry"],
+            + text.table(["parameter", ">value", ">oscillates from", ">active from", ">linear, exact", ">re-entry"],
                          [[", ".join(filter(None, (row["name"], row["unit"]))),
                            f"**{row['value']}**" if row["standard"] else row["value"], first(row["swings"]),
                            first(row["active"]), text.figure(row["exact"]),
                            text.figure(row["re_entry"]) if row["re_entry"] > 0 else "-"] for row in data["knobs"]])
             + "\n## Fixed point and double\n\n"
-            + "".join(f"* {row['numeric']}: {row['others']} of {row['cells']} cells have another verdict than in double; the "
-                      f"first crossing differs in {row['columns']} columns, at most by a\n  factor of {row['factor']:.3g}.\n"
+            + "".join(f"* {row['numeric']}: {row['others']} of {row['cells']} cells oscillate in one number type and not in the other. "
+                      f"The first crossing\n  differs in {row['columns']} columns, by a factor of at most {row['factor']:.3g}.\n"
                       for row in data["numbers"])
             + NUMBERS + question(data["question"]) + HOW + FILES + data["provenance"] + "\n")
 
