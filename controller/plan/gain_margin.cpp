@@ -231,7 +231,7 @@ std::string gain_warning(const LoadedScene& scene, const GainMargin& margin) {
              "held %s at %d Hz: %s; ",
              margin.stiffness_n_per_mm, margin.damping_ns_per_mm, margin.deciding(),
              device_word(scene).c_str(), scene.servo.rate_hz,
-             margin.deciding() < 1 ? "it is unstable and will swing" : "it may tremble") +
+             margin.deciding() < 1 ? "it is unstable and will oscillate" : "it may oscillate") +
          way_out(scene, margin);
 }
 

@@ -355,7 +355,7 @@ void refuse_unfelt(const SceneSpec& scene) {
   for (const ToolSpec& tool : scene.tools) {
     if (!tool.shaft.length_mm) continue;
     refuse(tool.shaft_location,
-           " is felt by a proxy alone; set force.model = \"proxy\", or leave the shaft out");
+           " has contact only with the proxy; set force.model = \"proxy\", or leave the shaft out");
   }
 }
 
@@ -472,7 +472,8 @@ void refuse_empty(const SceneSpec& scene) {
     refuse(scene.path, ": no [[volume]]; write one with file = \"phantom\" or a path");
   }
   if (std::ranges::none_of(scene.volumes, &VolumeSpec::solid)) {
-    refuse(scene.path, ": no [[volume]] is solid; set solid = true for what is to be felt");
+    refuse(scene.path,
+           ": no [[volume]] is solid; set solid = true for the one that the tool touches");
   }
   if (scene.tools.empty()) {
     refuse(scene.path, ": no [[tool]]; write one with shape = \"ball\" and size_vox = 16");

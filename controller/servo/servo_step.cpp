@@ -329,10 +329,11 @@ void update_energy(ServoState<N>& state, const ForceRequest<N>& wanted, bool mot
   state.ledger.send(parts);
 }
 
-/// Of the bur in the hand.
+/// Of the bur in the hand; 1 if it does not wear.
 template <class N>
 double sharpness_of(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept {
   const CutLaw<N>& law = plan.tools[state.active_tool].law;
+  if (!(law.wear_half > 0)) return 1;
   const BurWear<N>& wear = state.force_cut.wear[state.active_tool];
   return static_cast<double>(wear.sharpness(law)) /
          static_cast<double>(BurWear<N>{}.sharpness(law));

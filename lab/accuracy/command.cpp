@@ -54,8 +54,9 @@ void print(std::ostream& out, const std::vector<Entry>& entries,
   }
 }
 
-/// What a scene of the default contact has: its active tool and its finest voxel.
-ProxySubject subject_of(const std::string& path) {
+/// What a scene of the default contact has: the tool of its first arm and its finest voxel, which
+/// `out` gets as a line.
+ProxySubject subject_of(const std::string& path, std::ostream& out) {
   const LoadedScene scene = load_scene(path);
   if (scene.force.model == ForceModel::paper) {
     throw HilError("--scene: " + path +
@@ -64,7 +65,11 @@ ProxySubject subject_of(const std::string& path) {
   if (scene.force.model == ForceModel::external || scene.volumes.empty() || scene.tools.empty()) {
     throw HilError("--scene: " + path + " has no contact of a tool with a volume; name another");
   }
-  return {scene.tools[scene.active_tool], contact_unit_mm(scene)};
+  const ProxySubject subject{scene.tools[scene.active_tool], contact_unit_mm(scene)};
+  out << format("tool %s%s, voxels of %.4g mm\n", subject.tool.name.c_str(),
+                scene.second ? " of the first arm (the second arm's is not measured)" : "",
+                subject.voxel_mm);
+  return subject;
 }
 
 /// `kerf-lab accuracy`: each knob of the contact against analytic shapes.
@@ -80,10 +85,10 @@ class AccuracyCommand final : public LabCommand {
 
 AccuracyCommand::AccuracyCommand(Arguments& program)
     : LabCommand(program, "accuracy", "each knob of the contact against analytic shapes") {
-  app_.option(
-          "--scene", scene_,
-          "measure this scene's tool in its voxels, twice and half of them: the default contact "
-          "alone")
+  app_.option("--scene", scene_,
+              "measure the tool that this scene begins with, of two arms the first one's, in its "
+              "voxels, "
+              "twice and half of them: the default contact alone")
       .shown_as("FILE");
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
   app_.option("--csv", csv_, "write the figures as a table").shown_as("FILE");
@@ -105,7 +110,7 @@ int AccuracyCommand::run(std::ostream& out) const {
   if (!scene_.empty() && !(page_.empty() && plot.empty())) {
     throw HilError("--scene: page and plot are those of the standard; use --csv or --report");
   }
-  const ProxySubject subject = scene_.empty() ? ProxySubject::standard() : subject_of(scene_);
+  const ProxySubject subject = scene_.empty() ? ProxySubject::standard() : subject_of(scene_, out);
   if (!plot.empty()) check_can_plot();
   const int core = pin_lab(core_);
   std::vector<Entry> entries, of_proxy;

@@ -16,6 +16,7 @@
 #include "lab/run/lab_run.hpp"
 #include "lab/stability/arm.hpp"
 #include "lab/stability/axes.hpp"
+#include "lab/stability/axis_options.hpp"
 #include "lab/stability/device_file.hpp"
 #include "lab/stability/map.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -52,8 +53,8 @@ class ImpedanceCommand final : public LabCommand {
                                   const LoadedScene* walls) const;
   [[nodiscard]] std::vector<double> frequencies(double rate_hz) const;
 
-  std::array<std::string, zwidth::kAxisCount> axes_, option_names_;
-  std::string direction_, frequency_, log_, json_, plot_;
+  zwidth::AxisOptions axes_;
+  std::string frequency_, log_, json_, plot_;
   std::optional<double> stiffness_, amplitude_;
   bool arm_ = false;
 };
@@ -61,19 +62,7 @@ class ImpedanceCommand final : public LabCommand {
 ImpedanceCommand::ImpedanceCommand(Arguments& program)
     : LabCommand(program, "impedance",
                  "which stiffness and damping a hand feels, over frequency, beside the theory") {
-  for (const AxisId axis : kAxes) {
-    const std::size_t i = zwidth::index_of(axis);
-    const zwidth::AxisKind& kind = zwidth::axis_kinds()[i];
-    std::string meaning = kind.meaning;
-    if (*kind.standard != 0) meaning += std::string(" [") + kind.standard + "]";
-    option_names_[i] = std::string("--") + kind.name;  // the option keeps only a pointer
-    app_.option(option_names_[i].c_str(), axes_[i], meaning)
-        .shown_as(*kind.unit != 0 ? kind.unit : "VALUE");
-  }
-  app_.option("--direction", direction_,
-              "of a --device that is a file of kerf identify: x, y, z, such as 1,0,1, or worst "
-              "[worst]")
-      .shown_as("N");
+  axes_.declare(app_, kAxes);
   app_.option("--stiffness", stiffness_, "of the wall, K, N/mm").within(1e-4, 127).shows_default();
   app_.option("--frequency", frequency_,
               "of the motion: from:to:count, even in their ratio, or a list [1 to half of the "
@@ -122,9 +111,9 @@ void ImpedanceCommand::take_log(const LoggedWall& wall,
 }
 
 Spectrum ImpedanceCommand::subject(const LoggedWall* log, std::ostream& out) const {
-  std::array<std::string, zwidth::kAxisCount> texts = axes_;
+  std::array<std::string, zwidth::kAxisCount> texts = axes_.texts;
   if (log != nullptr) take_log(*log, texts);
-  zwidth::take_device_option(direction_, arm_, texts, out);
+  zwidth::take_device_option(axes_.direction, arm_, texts, out);
   Spectrum spectrum;
   for (const AxisId axis : kAxes) {
     const std::size_t i = zwidth::index_of(axis);
@@ -141,7 +130,7 @@ Spectrum ImpedanceCommand::subject(const LoggedWall* log, std::ostream& out) con
   }
   if (arm_) {
     for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
-      if (axes_[zwidth::index_of(axis)].empty()) continue;
+      if (axes_.texts[zwidth::index_of(axis)].empty()) continue;
       throw HilError(std::string("--") + zwidth::axis_kinds()[zwidth::index_of(axis)].name +
                      ": device and servo have their own with --arm; leave one of the two out");
     }

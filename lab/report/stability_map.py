@@ -264,18 +264,18 @@ def draw_legend(picture, columns, stiffness, top):
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
     patches = [(RESTS, "comes to rest: proven"), (ACTIVE, "travel small or falling, but the wall goes on giving energy"),
-               (SWINGS, "swings on (a limit cycle, or worse)"), (UNDECIDED, "undecided: neither rest nor swing is proven"),
+               (SWINGS, "oscillates (a limit cycle, or worse)"), (UNDECIDED, "undecided: neither settled nor oscillating is proven"),
                (NONE, "not stable even without a wall, or not measured")]
     if any(cell["arithmetic"] for column in columns for cell in column["cells"]):
-        patches.insert(3, (ARITHMETIC, "rests, but for rounding of fixed numbers: below 1 µm, rests in double"))
+        patches.insert(3, (ARITHMETIC, "settles except for the rounding of fixed point: below 1 µm, settles in double"))
     groups = [[Patch(color=colour, label=label) for colour, label in (patches if stiffness else patches[-2:])]]
     if stiffness:
         def is_seen(values):
             return any(stiffness[0] <= (value or 0) <= stiffness[-1] for value in values)
 
         exact, other, passive, quantum, swing, energy = line_styles(2)
-        groups.append([Line2D([], [], label="measured: first swing, of any seed", **swing),
-                       Line2D([], [], label="bar: first swings of all seeds", **BAND),
+        groups.append([Line2D([], [], label="measured: first oscillation, of any seed", **swing),
+                       Line2D([], [], label="bar: first oscillations of all seeds", **BAND),
                        Line2D([], [], label="measured: first energy that goes on", **energy)])
         seen = [is_seen(values) for values in zip(*(analytic_lines(column) for column in columns))]
         groups.append([Line2D([], [], label=label, **style) for drawn, label, style in zip(

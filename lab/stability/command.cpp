@@ -22,6 +22,7 @@
 #include "lab/run/lab_run.hpp"
 #include "lab/stability/arm.hpp"
 #include "lab/stability/axes.hpp"
+#include "lab/stability/axis_options.hpp"
 #include "lab/stability/device_file.hpp"
 #include "lab/stability/map.hpp"
 #include "lab/stability/map_file.hpp"
@@ -149,8 +150,8 @@ class ZwidthCommand final : public LabCommand {
   [[nodiscard]] bool chooses_map() const;
   int merge(std::ostream& out) const;
 
-  std::array<std::string, kAxisCount> axes_, option_names_;
-  std::string stiffness_, map_ = kMapped, shard_ = "1/1", part_, portraits_, page_, direction_;
+  AxisOptions axes_;
+  std::string stiffness_, map_ = kMapped, shard_ = "1/1", part_, portraits_, page_;
   std::vector<std::string> cells_, merge_;
   OutputPaths paths_;
   bool quick_ = false, arm_ = false;
@@ -162,18 +163,9 @@ class ZwidthCommand final : public LabCommand {
 ZwidthCommand::ZwidthCommand(Arguments& program)
     : LabCommand(program, "zwidth",
                  "which stiffness and damping a device bears, beside the theory") {
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const AxisKind& kind = axis_kinds()[i];
-    std::string meaning = kind.meaning;
-    if (*kind.standard != 0) meaning += std::string(" [") + kind.standard + "]";
-    option_names_[i] = std::string("--") + kind.name;  // the option keeps only a pointer
-    app_.option(option_names_[i].c_str(), axes_[i], meaning)
-        .shown_as(*kind.unit != 0 ? kind.unit : "VALUE");
-  }
-  app_.option("--direction", direction_,
-              "of a --device that is a file of kerf identify: x, y, z, such as 1,0,1, or worst "
-              "[worst]")
-      .shown_as("N");
+  std::array<AxisId, kAxisCount> all{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) all[i] = static_cast<AxisId>(i);
+  axes_.declare(app_, all);
   app_.option("--stiffness", stiffness_,
               "of the wall, K: from:to:count, even in their ratio [0.05:50:40]")
       .shown_as("N/mm");
@@ -308,8 +300,8 @@ MapSpec ZwidthCommand::spec(std::ostream& out) const {
   MapSpec spec;
   spec.mapped = mapped_axes(map_);
   spec.arm = arm_;
-  std::array<std::string, kAxisCount> texts = axes_;
-  take_device_option(direction_, arm_, texts, out);
+  std::array<std::string, kAxisCount> texts = axes_.texts;
+  take_device_option(axes_.direction, arm_, texts, out);
   for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
     if (!arm_ || texts[index_of(axis)].empty()) continue;
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
@@ -320,7 +312,7 @@ MapSpec ZwidthCommand::spec(std::ostream& out) const {
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
                    ": the whole arm has hits of its own; leave one of the two out");
   }
-  if (!arm_ && !axes_[index_of(AxisId::mode)].empty()) {
+  if (!arm_ && !axes_.texts[index_of(AxisId::mode)].empty()) {
     throw HilError("--mode: one axis is rigid; add --arm, or leave it out");
   }
   const auto standard = [&](AxisId axis, const char* text) {
@@ -441,9 +433,9 @@ bool ZwidthCommand::measure(const MapSpec& map, const Shard& shard, PartWriter& 
 }
 
 bool ZwidthCommand::chooses_map() const {
-  return std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); }) ||
+  return std::ranges::any_of(axes_.texts, [](const std::string& a) { return !a.empty(); }) ||
          map_ != kMapped || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
-         seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1" || !direction_.empty();
+         seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1" || !axes_.direction.empty();
 }
 
 int ZwidthCommand::merge(std::ostream& out) const {
@@ -485,7 +477,7 @@ int ZwidthCommand::run(std::ostream& out) const {
   try_laws(map, out);
   if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
-    if (!axes_[index_of(AxisId::damping)].empty() || !stiffness_.empty() || seeds_ > 0 ||
+    if (!axes_.texts[index_of(AxisId::damping)].empty() || !stiffness_.empty() || seeds_ > 0 ||
         shard_ != "1/1") {
       throw HilError(
           "--portraits: --cells have the stiffness and the damping, --seed the one seed; leave "

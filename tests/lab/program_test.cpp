@@ -57,6 +57,12 @@ TEST_CASE("two outputs that are one file are refused before anything is measured
   }
 }
 
+TEST_CASE("accuracy of a scene with two arms names the arm that it measures") {
+  const LabAnswer answer = lab("accuracy --scene " KERF_TEST_SCENES "/two_arms.toml --cpu 1000");
+  CHECK(answer.code == 2);  // the line comes before the measurement
+  CHECK(has(answer.out, " of the first arm (the second arm's is not measured), voxels of "));
+}
+
 TEST_CASE("nothing lies beside an output while a run measures, so that it may be stopped") {
   const TemporaryFolder folder;
   const kerf::LabOutput output("--csv", folder / "a.csv", ".csv");

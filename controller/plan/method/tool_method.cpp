@@ -157,7 +157,7 @@ class SurfaceMethod final : public ToolMethod {
     if (in.scene.force.model == ForceModel::paper) return std::nullopt;
     if (in.scene.cut.model != CutModel::none) return std::nullopt;
     if (in.scene.force.model == ForceModel::external) return "a program gives the force";
-    return "its surface alone is felt, and nothing is cut";
+    return "only its surface has contact, and nothing is cut";
   }
 };
 
