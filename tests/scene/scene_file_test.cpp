@@ -329,7 +329,8 @@ TEST_CASE("what contradicts itself or is missing is reported with its line") {
       {after(shaft + "handpiece_radius_mm = 0.4\n"),
        "8: tool.handpiece_radius_mm = 0.4 is narrower than the shaft; use at least 0.5"},
       {after(shaft + "[force]\nmodel = \"paper\"\n"),
-       "7: tool.shaft_length_mm = 9 has contact only with the proxy; set force.model = \"proxy\", or "
+       "7: tool.shaft_length_mm = 9 has contact only with the proxy; set force.model = \"proxy\", "
+       "or "
        "leave the shaft out"},
   });
 }
