@@ -12,67 +12,70 @@ import text
 ABOUT = """\
 ## Accuracy of each setting
 
-Made by `./kerf lab accuracy --page docs/contact.md`; every figure comes from one run, nothing is typed
-by hand. On one machine a run repeats bit for bit, but for the times. `--csv` writes all figures, each metric on each
-shape; `--report` writes the same as JSON. `./kerf lab accuracy --scene mine.toml` measures the default contact with the
-tool and the voxels of a scene.
+Made by `./kerf lab accuracy --page docs/contact.md`: all tables of this part come from one run. On one machine a run repeats
+bit for bit, except for the times. `--csv` writes all figures, each metric on each shape; `--report` writes them as JSON.
+`./kerf lab accuracy --scene mine.toml` measures the default contact with the tool and the voxels of a scene.
 
 A ball of 0.625 mm radius touches six shapes, at 100 positions each and at depths up to its radius: a plane at 100 tilts, a
-ball, a torus, a plate as thin as two voxels of 0.125 mm, a groove of 90 degrees, a ball of enamel around dentin. One setting
-is changed at a time; the others stay at the standard, in bold.
+ball, a torus, a plate as thin as two voxels of 0.125 mm, a groove of 90 degrees (crease), and a ball of enamel around dentin.
+One setting is changed at a time. All others have their standard value, in bold in the tables.
 
 """
 
 PROXY = """\
 ### The swept proxy
 
-The default contact (docs/theory.md 4), as the servo runs it. A hand goes straight down from a contact; the tool should stay
-where it was, so that the spring from hand to tool is the way back. Faces are ramps over two voxels, as a scanner has them.
+This is the default contact (docs/theory.md 4), as the servo runs it. A hand goes straight down from a contact. The tool
+should stay at the contact, so the spring should be as long as the way of the hand and point back along it. Faces are ramps
+over two voxels, as a scanner has them.
 
-* `depth`: of the tool's centre along the normal, from where it should rest, in voxels.
-* `force`: length of the spring over that of the way; `direction`: its angle to the normal. Both where the way is at least a
-  tenth of the radius.
-* `step`: the change of the force over 0.00125 mm (a hundredth of the standard's voxel) along the face, over the force.
+* `depth`: distance of the tool's centre along the normal from its ideal position of rest, in voxels.
+* `force`: length of the spring over the way of the hand, as an error. `direction`: angle of the spring to the normal. Both
+  are taken only if the way is at least a tenth of the radius.
+* `step`: the change of the force over 0.00125 mm along the face (a hundredth of the standard voxel), over the force.
 * `us p50`, `p99`: times of one tick that slides on the ball, without milling.
 
 """
 
 NOTICED = """\
-What a hand can notice: a force of one direction from one of another at 18.4 degrees if the picture shows the same, at 25.6
-without a picture (Barbagli, Salisbury, Ho, Spence, Tan 2006, the abstract's means of the three conditions); a force that
-is 7 % larger, from 2.5 to 10 N (Pang, Tan, Durlach 1991, the abstract). So of the standard the direction is {direction} times finer
-than a hand, the force at its worst {force} times. Voxels half as wide make a tick {fine_time} times as long and bring
-{fine_direction} instead of {standard_direction} degrees: both are far below what is felt. They are worth it for a shape that is
-thinner than two voxels, not for the hand.
+What a hand can notice:
+
+* Two forces have different directions: from 18.4 degrees on if the picture shows the same directions, from 25.6 without a
+  picture (Barbagli, Salisbury, Ho, Spence, Tan 2006, means of the three conditions in the abstract).
+* A force is larger: from 7 % on, at 2.5 to 10 N (Pang, Tan, Durlach 1991, abstract).
+
+So the direction of the standard is {direction} times finer than a hand can notice, and its force {force} times, both at their worst. Voxels
+half as wide make a tick {fine_time} times as long, and the direction {fine_direction} instead of {standard_direction} degrees. Both are far below what a hand
+notices. Use them for a shape that is thinner than two voxels, not for the hand.
 
 """
 
 PAPER = """\
 ### The paper's force
 
-One setting of the paper's contact force (docs/forces.md 7.1) is changed at a time. The standard is Q15 weights, tool
-pitch = voxel, `farid` gradients stored as int16, trilinear, voxels of 0.125 mm in 128^3.
+One setting of the paper's contact force (docs/forces.md 7.1) is changed at a time. The standard has Q15 weights, a tool
+pitch of one voxel, `farid` gradients stored as int16, trilinear interpolation, and voxels of 0.125 mm in 128^3.
 
-Truth is the shape itself with sharp faces: F = -p0 SURFINT rho n dA over the tool's surface, exact to 1e-4.
+The true force is that of the shape itself with sharp faces: F = -p0 SURFINT rho n dA over the tool's surface, exact to 1e-4.
 Forces are fractions of full scale, p0 pi R^2. `rms` and `max` are over all shapes unless stated.
 
-* `direction`: the angle to the force of theory, where that has a tenth of full scale.
+* `direction`: the angle to the true force, where this force is at least a tenth of full scale.
 * `loop`: |SUM dW| / SUM |dW| around tilted circles of 0.375 mm, of one sample or of the whole tool. It is the work that
   a static tooth gives or takes on a closed path, and should be 0.
-* `us p50`, `p99`: times of one tick of the tool without milling. Where the servo has fast kernels they run: Q15 in the
-  methods `gather`, `aligned` and `splat`. Double is the servo's template. Times in brackets are of plain
-  loops of the lab (Q8, Q12, splines, other interpolations): compare them with no other time.
+* `us p50`, `p99`: times of one tick of the tool without milling. Q15 runs the fast kernels of the servo in the methods
+  `gather`, `aligned` and `splat`. Double runs the servo's template. Times in brackets are of plain loops of the lab (Q8, Q12,
+  splines, other interpolations). Do not compare them with other times.
 
 """
 
 REMOVAL = """\
 ### Removal
 
-Not measured here; `tests/kernel/milling_test.cpp` bounds it. One stamp of a ball of five voxels' radius removes
-the ball's volume to 1 %, and a straight sweep of ten voxels' radius that stays on the voxels' lattice its capsule.
-Off the lattice no sweep is that exact: voxels at its rim are partly covered by many stamps in a row, and by the
-paper's overlap rule each stamp takes its fraction of the rest. A groove then has a radius that is up to about
-half a voxel larger than the tool's, at steps of a quarter to a whole voxel: the coarser the voxels, the more.
+This study does not measure removal; `tests/kernel/milling_test.cpp` has limits for it. One stamp of a ball with a radius of
+five voxels removes the ball's volume to 1 %. A straight sweep with a radius of ten voxels that stays on the lattice of the
+voxels removes its capsule to 1 %. Off the lattice no sweep is that exact. Many stamps in a row partly cover the voxels at its
+rim, and by the paper's overlap rule each stamp removes its fraction of what is left. A groove then has a radius that is up to
+about half a voxel larger than the tool's, at steps of a quarter of a voxel to a whole voxel.
 """
 
 PERCENT, PERMILLE, PPM = 100, 1000, 1e6
@@ -106,9 +109,9 @@ PROXY_COLUMNS = [SAMPLES, DEPTH, DEPTH_MAX, THEORY, THEORY_MAX, DIRECTION, DIREC
 # Knob and what it is.
 PROXY_KNOBS = [
     ("proxy voxel", "Edge of a voxel. The shapes keep their millimetres."),
-    ("proxy spacing", "Distance of the samples on the tool's surface, over the servo's own."),
-    ("proxy numbers", "Of the loop."),
-    ("proxy kernels", "Of this machine. They give the same bits; a scene's rate is planned for each (docs/scenes.md)."),
+    ("proxy spacing", "Distance of the samples on the tool's surface, relative to the servo's own distance."),
+    ("proxy numbers", "Number type of the loop."),
+    ("proxy kernels", "Instruction sets of this machine. They give the same bits. The rate of a scene is planned for each (docs/scenes.md)."),
 ]
 
 # Knob, its text, its columns.
@@ -116,40 +119,40 @@ TABLES = [
     ("arithmetic", """\
 ### Arithmetic
 
-Force against the same text in double, in millionths of full scale, and one trilinear interpolation of
-random 16-bit corners, in steps of the corners. The servo has Q15 and double; Q8 and Q12 are
-coarser weights through its lerp.""",
+`against double` is the difference to the force of the same program text in double, in millionths of full scale. `corner` is
+the error of one trilinear interpolation of random 16-bit corners, in steps of the corners. The servo has Q15 and double. Q8
+and Q12 are coarser weights in the same interpolation.""",
      [DOUBLE, DOUBLE_MAX, CORNER, CORNER_MAX, MEMORY]),
     ("pitch", """\
 ### Pitch of the tool's samples
 
-In voxel edges. A sample represents the cube around it, so a coarse ball does not have the ball's volume.""",
+The pitch is in voxel edges. A sample represents the cube around it, so coarse samples do not have the ball's volume.""",
      [SAMPLES, THEORY, THEORY_MAX, DIRECTION, TOOL_LOOP, STEP]),
     ("kernel", """\
 ### Gradient kernel
 
-`normal` is the angle between the gradient at the voxels on the ball's face and the exact normal; `noise` is the standard
-deviation that remains of white noise of deviation 1.""",
+`normal` is the angle between the gradient and the exact normal, at the voxels on the ball's face. `noise` is the standard
+deviation of the gradient for white noise with a deviation of 1 in the voxels.""",
      [NORMAL, NORMAL_MAX, NOISE, SAMPLE_LOOP, TOOL_LOOP, THEORY]),
     ("storage", """\
 ### What is stored beside the density
 
-Int16 gradients are the servo's method `gather`, `aligned` its method for round tools, `splat` that for any
-tool in scenes that cut (its time holds the modification force, too). `spline 2` and `spline 3` are the
-exact derivative of the density's quadratic and cubic B-spline: a reference for the accuracy, not for the
-time. The last row has voxels half as wide: compare it with that of `gather` in "Voxel edge".""",
+Int16 gradients are the servo's method `gather`. `aligned` is its method for round tools, and `splat` its method for any tool
+in scenes that cut; the time of `splat` includes the modification force. `spline 2` and `spline 3` are the exact derivative of
+the density's quadratic and cubic B-spline: a reference for the accuracy, not for the time. The last row has voxels half as
+wide. Compare it with the row 0.0625 mm, method `gather`, in "Voxel edge".""",
      [SAMPLES, MEMORY, DOUBLE, DOUBLE_MAX, THEORY, DIRECTION, SAMPLE_LOOP, TOOL_LOOP]),
     ("interpolation", """\
 ### Interpolation of the stored gradient
 
-Trilinear is the servo's; the others are B-splines of degree 0, 2 and 3 in plain double. `step`: the
-change of the force over 0.01 voxel along the face, in thousandths of full scale.""",
+The servo has trilinear interpolation. The others are B-splines of degree 0, 2 and 3 in plain double. `step`: the change of
+the force over 0.01 voxel along the face, in thousandths of full scale.""",
      [STEP, DIRECTION, SAMPLE_LOOP, TOOL_LOOP, THEORY, NOISE]),
     ("voxel", """\
 ### Voxel edge
 
-The same millimetres in 64^3, 128^3 and 256^3 voxels, tool pitch = voxel. `order`: log2 of how much
-smaller the error is than in the row above; a blur of fixed width in voxels gives 2 in the limit.""",
+The same shapes in 64^3, 128^3 and 256^3 voxels, with a tool pitch of one voxel. `order`: log2 of the ratio of the error in
+the row above to the error in this row. A blur of a fixed width in voxels gives 2 in the limit.""",
      [SAMPLES, THEORY, THEORY_MAX, ORDER, DIRECTION, TOOL_LOOP]),
 ]
 
@@ -157,23 +160,23 @@ smaller the error is than in the row above; a blur of fixed width in voxels give
 ADVICE = """\
 ### What to choose
 
-* A round tool: the method `aligned`, {aligned|us} us a tick, at most {aligned|DOUBLE_MAX} ppm of full scale away from double. Nothing is
-  stored, so a cut refreshes nothing.
-* Any other tool: `gather` ({int16 gradients|us} us, at most {int16 gradients|DOUBLE_MAX} ppm, {int16 gradients|MEMORY} bytes a voxel), and `splat` where the scene cuts ({splat|us} us,
-  at most {splat|DOUBLE_MAX} ppm, nothing stored).
-* Few samples favour `gather`, many `aligned`: {aligned|SAMPLES} of them take {int16 gradients|us} against {aligned|us} us, {aligned 0.0625 mm|SAMPLES} (in voxels of 0.0625 mm)
-  {0.0625 mm|us} against {aligned 0.0625 mm|us} us. The servo takes `aligned` wherever it can: it also needs no memory and no refresh.
-* Fixed point: Q15, at most {Q15|DOUBLE_MAX} ppm away from double (Q12 {Q12|DOUBLE_MAX}, Q8 {Q8|DOUBLE_MAX}). Theory is {Q15|THEORY} % away from all of them: the
-  hand could do with Q8; the 16 bits of the kernels hold Q15.
-* Pitch 1. Half of it takes {1/2|1} times as long for an error of {1/2|THEORY} instead of {1|THEORY} %; twice of it leaves {2|THEORY} %.
+* For a round tool: the method `aligned`. It takes {aligned|us} us a tick and is at most {aligned|DOUBLE_MAX} ppm of full scale away from double.
+  Nothing is stored, so a cut refreshes nothing.
+* For any other tool: `gather` ({int16 gradients|us} us, at most {int16 gradients|DOUBLE_MAX} ppm, {int16 gradients|MEMORY} bytes a voxel), and `splat` if the scene cuts
+  ({splat|us} us, at most {splat|DOUBLE_MAX} ppm, nothing stored).
+* Few samples favour `gather`, many `aligned`: {aligned|SAMPLES} samples take {int16 gradients|us} against {aligned|us} us, and {aligned 0.0625 mm|SAMPLES} (in voxels of 0.0625 mm)
+  {0.0625 mm|us} against {aligned 0.0625 mm|us} us. The servo takes `aligned` if it can, because it also needs no memory and no refresh.
+* Fixed point: Q15, at most {Q15|DOUBLE_MAX} ppm away from double (Q12 {Q12|DOUBLE_MAX}, Q8 {Q8|DOUBLE_MAX}). All of them are {Q15|THEORY} % away from the true force. For
+  the hand Q8 would do; the 16 bits of the kernels hold Q15.
+* A pitch of 1. Half of it takes {1/2|1} times as long for an error of {1/2|THEORY} instead of {1|THEORY} %. A pitch of 2 has {2|THEORY} %.
 * Gradients by `farid`: normals to {farid|NORMAL} deg rms (`sobel5` {sobel5|NORMAL}, `central` {central|NORMAL}). `central` blurs less, so its force
-  is nearer to theory ({central|THEORY} against {farid|THEORY} %), but it passes {central|NOISE} of the noise instead of {farid|NOISE}, and a closed path of
-  the tool makes or takes {central|TOOL_LOOP} of the work that goes to and fro instead of {farid|TOOL_LOOP}.
-* Where no energy may come from nothing: a spline of the density. The tool's loop makes or takes {spline 2|TOOL_LOOP}
-  (quadratic) or {spline 3|TOOL_LOOP} (cubic) of the work instead of {int16 gradients|TOOL_LOOP}.
+  is nearer to the true force ({central|THEORY} against {farid|THEORY} %). But it passes {central|NOISE} of the noise instead of {farid|NOISE}. And a closed path of
+  the tool makes or takes {central|TOOL_LOOP} of the absolute work instead of {farid|TOOL_LOOP}.
+* If a closed path must make no energy: a spline of the density. The loop of the tool makes or takes {spline 2|TOOL_LOOP}
+  (quadratic) or {spline 3|TOOL_LOOP} (cubic) of the absolute work instead of {int16 gradients|TOOL_LOOP}.
 * Never the nearest voxel: 0.01 voxel can change the force by {nearest|STEP} thousandths of full scale, trilinear by {trilinear|STEP}.
-* Most of the error of theory is blur, by the kernel and by the ramp of one voxel at each face. Voxels of
-  0.0625 mm instead of 0.125 mm take {0.0625 mm|0.125 mm} times as long in the method `gather` and bring {0.0625 mm|THEORY} instead of {0.125 mm|THEORY} %.
+* Most of the error against the true force is blur, by the kernel and by the ramp of one voxel at each face. Voxels of
+  0.0625 mm instead of 0.125 mm take {0.0625 mm|0.125 mm} times as long in the method `gather`, and have {0.0625 mm|THEORY} instead of {0.125 mm|THEORY} %.
 
 """
 

@@ -15,76 +15,85 @@ import text
 ABOUT = """\
 # Contact
 
-Made by `./kerf studies extremes --page docs/contact.md`; every figure comes from one run, nothing is typed by
-hand. A run repeats bit for bit, but for the times of ticks. `--report` writes the rows as JSON, `--only` measures
-some groups of them. The command exits with 1 if a limit is not kept.
+Made by `./kerf studies extremes --page docs/contact.md`: all tables of this part come from one run. A run repeats bit for
+bit, except for the times of ticks. `--report` writes the rows as JSON, `--only` measures some groups of them. The exit code
+is 1 if a limit is not kept.
 
-The swept proxy (`[force] model = "proxy"`) keeps the whole tool out of the solid, and a spring pulls the hand to
-it. The paper's force (`"paper"`) is the sum of the density's gradients inside of the tool. docs/theory.md derives
-both. They are measured as the servo runs them: in fixed point, by the fastest kernels of this machine. Unless stated,
-a voxel is 0.1 mm, a tick 1 ms, the tool a ball of 16 voxels, and a face is a ramp of density over two voxels.
-[Promises](#promises-and-their-tests) lists what kerf promises, with the tests. [Accuracy](#accuracy-of-each-setting) measures
-each setting of both forces.
+The page measures two contact forces, derived in docs/theory.md and in docs/forces.md 7:
+
+* the swept proxy (`[force] model = "proxy"`), the default, keeps the whole tool out of the solid, and a spring pulls the
+  hand to the proxy;
+* the paper's force (`"paper"`) is the sum of the gradients of density inside the tool.
+
+Both are measured as the servo runs them: in fixed point, by the fastest kernels of this machine. Unless stated, a voxel is
+0.1 mm, a tick 1 ms, the tool a ball with a diameter of 16 voxels, and a face a ramp of density over two voxels. R 40 is a
+radius of 40 voxels, and *sd* a standard deviation. In the tables *must* is the limit of a row; *aim* is not checked.
+
+[Promises](#promises-and-their-tests) lists what kerf promises, with the tests. [Accuracy](#accuracy-of-each-setting)
+measures each setting of both forces.
 
 """
 
 PROMISES = """\
 ## Promises and their tests
 
-What kerf promises of contact, cutting, stability and robustness, and the test of each promise. All tests run with `./kerf
-test`; where numbers matter they run in fixed point and in double, most contact tests at 0.25, 1 and 8 kHz. The words `walls`,
-`rests`, `slides`, `air`, `isos`, `cutting` and `traps` are groups of rows above (`--only`), which have limits and figures.
-Tests cite the numbers F (force), N (numbers and gradients) and S (stability).
+The table has what kerf promises about contact, cutting, stability and robustness, with the test of each promise. `./kerf
+test` runs the tests in `tests/`. Where numbers matter they run in fixed point and in double, and most contact tests at 0.25,
+1 and 8 kHz. The words `walls`, `rests`, `slides`, `air`, `isos`, `cutting` and `traps` are groups of rows above (`--only`).
+*In these rows* means that the rows of the group have the limits. Tests cite the numbers F (force), N (numbers and gradients)
+and S (stability).
 
 | | promise | limit | test |
 |---|---|---|---|
-| F5 | a closed path on a static ball gives no energy | 0.005 of the work to and fro | `tests/servo/closed_loops_test.cpp` |
+| F5 | a closed path on a static ball gives no energy | 0.005 of the absolute work | `tests/servo/closed_loops_test.cpp` |
 | F7 | no motion up to 10 m/s crosses a wall of 2 voxels or more | in these rows | `walls`, `tests/proxy/iso_test.cpp` |
 | | a tick queries the field a bounded number of times | in these rows | `walls`, `tests/proxy/iso_test.cpp` |
 | F8 | the force is smooth over bumps: R 14, 100 mm/s, 1 voxel deep | in these rows | `slides` |
 | | fixed point and double agree on one motion | 0.05 % of the mean force | `tests/proxy/slide_test.cpp` |
 | F9 | a ball rests on a plane of any tilt | in these rows | `rests` |
-| F10, S16 | feed and force of a flat tool follow Preston's law | 2 % and 1 % | `tests/kernel/preston_test.cpp` |
-| F11 | removed and carried volume is the integral of G F | 1e-6 | `tests/kernel/preston_test.cpp`, `tests/servo/force_cut_test.cpp`, `cutting` |
-| F12, F15 | without force or spindle nothing is cut; a cut depends on the force of its own tick alone | exact | `tests/kernel/preston_test.cpp`, `tests/kernel/milling_test.cpp` |
+| F10, S16 | the feed and the force of a flat tool follow Preston's law | 2 % and 1 % | `tests/kernel/preston_test.cpp` |
+| F11 | removed plus carried volume is the integral of G F | 1e-6 | `tests/kernel/preston_test.cpp`, `tests/servo/force_cut_test.cpp`, `cutting` |
+| F12, F15 | without force or spindle nothing is cut; a cut depends only on the force of the same tick | exact | `tests/kernel/preston_test.cpp`, `tests/kernel/milling_test.cpp` |
 | F13 | the carry makes cuts below one density step exact | 1e-6 | `tests/kernel/milling_test.cpp` |
-| F14 | stamp of a ball of R 5 voxels and more has its volume | 1 % | `tests/kernel/milling_test.cpp` |
+| F14 | one stamp of a ball of R 5 or more removes the ball's volume | 1 % | `tests/kernel/milling_test.cpp` |
 | S1 to S6 | exact stability boundary of a sampled wall, with delay, filter, device and hand | last digit of tables, 0.2 % | `tests/stability/stable_gains_test.cpp` |
-| S7, S8 | damping of a passive wall, with filter and any delay | 1e-6 | `tests/stability/passive_limits_test.cpp` |
-| S9 to S13 | one axis in time against the boundary; with friction and encoder steps | 2 %; 10 % of 44 tabled values | `tests/stability/one_axis_test.cpp`, `tests/lab/zwidth_test.cpp` |
-| S14 | the energy observer is the integral of force and velocity | 1e-9 J; sources sum to the last bit | `tests/servo/energy_ledger_test.cpp` |
-| S15 | the passivity controller keeps 20 N/mm under 1 N stable | within 2 mm, booked energy at least -1e-9 J | `tests/servo/stabiliser_test.cpp` |
-| S17, S18 | velocity of the estimator from encoder steps of 0.055 mm | 0.6 and 0.4 mm/s rms at 10 and 200 mm/s | `tests/servo/velocity_window_test.cpp` |
+| S7, S8 | damping at which a wall is passive, with filter and any delay | 1e-6 | `tests/stability/passive_limits_test.cpp` |
+| S9 to S13 | one simulated axis has the exact boundary, and with friction and encoder steps the boundaries of another simulator | 2 %; 10 % of 44 tabled values | `tests/stability/one_axis_test.cpp`, `tests/lab/zwidth_test.cpp` |
+| S14 | the energy observer is the integral of force times velocity | 1e-9 J; sources sum to the last bit | `tests/servo/energy_ledger_test.cpp` |
+| S15 | with the passivity controller a wall of 20 N/mm is stable under a push of 1 N | within 2 mm, booked energy at least -1e-9 J | `tests/servo/stabiliser_test.cpp` |
+| S17, S18 | error of the velocity estimator with encoder steps of 0.055 mm | 0.6 and 0.4 mm/s rms at 10 and 200 mm/s | `tests/servo/velocity_window_test.cpp` |
 | | material softer than the iso gives no force | in these rows | `tests/kernel/contact_volumes_test.cpp`, `tests/proxy/iso_test.cpp`, `traps` |
 | | no drag in air outside of the range that `--check` prints | in these rows | `tests/proxy/air_test.cpp`, `tests/plan/bounds_test.cpp`, `air` |
 | | normals do not depend on the iso | in these rows | `tests/proxy/iso_test.cpp`, `isos` |
 | | no command, hold or new tool moves the proxy through a wall | force within 2 % | `tests/servo/kept_place_test.cpp`, `tests/proxy/place_anew_test.cpp` |
-| | a solid at the border of a volume is cut as if air lay outside | exact | `tests/volume/crop_resample_test.cpp`, `tests/servo/border_test.cpp` |
-| | a gap in the reports gives no jump of the velocity | 2 % over 2 to 400 reports | `tests/servo/velocity_window_test.cpp` |
-| | a hand that moves with the force is released at once | 0 N within a tick | `tests/servo/force_limits_test.cpp` |
+| | a solid at the border of a volume is cut as if there were air outside | exact | `tests/volume/crop_resample_test.cpp`, `tests/servo/border_test.cpp` |
+| | a gap in the reports makes no jump of the velocity | 2 % over 2 to 400 reports | `tests/servo/velocity_window_test.cpp` |
+| | a hand that moves with the force is released at once, without the slew limit | 0 N within a tick | `tests/servo/force_limits_test.cpp` |
 | | a tool in its bore removes nothing behind it | 0.5 % | `tests/servo/material_share_test.cpp` |
 | | a tool cuts what it rests on: rims, flanks, radii from 1 to 7.5 voxels | no stop | `tests/servo/rim_cut_test.cpp`, `tests/tool/tool_mesh_test.cpp` |
 | | a pressing tool keeps cutting | no random press stops (open cases below) | `tests/studies/extremes_test.cpp`, `tests/proxy/shaft_test.cpp`, `tests/proxy/spent_work_test.cpp`, `traps` |
-| | filters, resets and refused starts behave equally at all rates | 20 ms | `tests/servo/output_and_reset_test.cpp` |
-| | the safety contract detects each of its seeded breaches | all | `.ci/mutate.py safety`, `tests/lab/contract_test.cpp`, `tests/lab/fault_run_test.cpp` |
-| | all devices arm within the same time from 250 to 8000 Hz | 1 s until a message | `tests/lab/arming_test.cpp`, `tests/shell/run_test.cpp` |
+| | filters, resets and refused starts behave in the same way at all rates | 20 ms | `tests/servo/output_and_reset_test.cpp` |
+| | the check of the safety contract detects each breach that is planted | all | `.ci/mutate.py safety`, `tests/lab/contract_test.cpp`, `tests/lab/fault_run_test.cpp` |
+| | Omni, Falcon and WoodenHaptics arm in the same time from 250 to 8000 Hz; a wait is reported | within 16 ms; after 1 s | `tests/lab/arming_test.cpp`, `tests/shell/run_test.cpp` |
 | | every signal that ends a program switches the motors off first | all signals | `tests/shell/motor_guard_test.cpp`, `tests/programs/signals_test.cpp`, `tests/programs/kills_test.cpp` |
-| | a broken file gives one line, never a crash or much memory | fuzzed | `tests/volume/sandbox_test.cpp`, `tests/volume/read_test.cpp`, `.ci/fuzz.sh` |
-| | no output follows a planted link or half replaces a file | all | `tests/posix/new_file_test.cpp` |
-| | few descriptors, small stacks or a full disk: one line and exit code 2 | all | `tests/programs/limits_test.cpp` |
-| | wrong partners (device, rate, lock-step) end with the same line on both sides | all | `tests/programs/partners_test.cpp`, `tests/hil/sockets_test.cpp` |
-| | the window writes outside of no block of its heap, and a kept picture equals a new one | random user | `tests/visualizer/app/window_test.cpp`, `kerf-visualizer-monkey` |
+| | a broken file gives one line, never a crash or a large allocation | fuzzed | `tests/volume/sandbox_test.cpp`, `tests/volume/read_test.cpp`, `.ci/fuzz.sh` |
+| | no output follows a planted link, and no file is replaced by a part of its new text | all | `tests/posix/new_file_test.cpp` |
+| | with few descriptors, a small stack or a full disk a program gives one line and exit code 2 | all | `tests/programs/limits_test.cpp` |
+| | programs that do not match (device, rate, lock-step) end with the same line on both sides | all | `tests/programs/partners_test.cpp`, `tests/hil/sockets_test.cpp` |
+| | the window never writes outside of its heap blocks, and a kept picture equals a new one | random user | `tests/visualizer/app/window_test.cpp`, `kerf-visualizer-monkey` |
 
 ### Where a promise is narrower than its words
 
-* F7: turning tools penetrate more than a ball (`walls`).
-* F14: a sweep whose stamps lie between voxels removes up to 23 % more than the capsule; its groove is within 0.55 voxels.
-* S15: the port itself may give 4.0 mJ between two readings, which no account contains.
-* Open: of 10,000 random presses from `--seed 0` two stop (scene 478, press 16; scene 483, press 0). Each is a tool with a shaft.
-  The planes that the servo keeps do not carry the hand's force. In 478 the only plane is the shaft's, and of 0.76 N it leaves
-  0.11 N to a head that touches nothing. In 483 a plane of the shaft and one of the head leave 0.56 of 0.78 N, which the cut counts
-  as the press of the head, where no material is left. Most likely a part of a shaft that touches two faces has one plane.
-  `tests/studies/contact/stuck_rows.cpp` lists them, so `traps` shows them and fails for any other.
+* F7: rotating tools penetrate deeper than a ball (`walls`).
+* F14: a sweep whose stamps lie between voxels removes up to 23 % more than the capsule. Its groove is at most 0.55 voxels
+  wider than the tool in radius.
+* S15: between two readings the port itself may give 4.0 mJ, which no account contains.
+* Open: of 10,000 random presses from `--seed 0` two stop cutting (scene 478, press 16; scene 483, press 0). In both the tool
+  has a shaft, and the planes that the servo keeps do not carry the force of the hand. In 478 the only plane is the shaft's.
+  Of 0.76 N it leaves 0.11 N to a head that touches nothing. In 483 one plane of the shaft and one of the head leave 0.56 of
+  0.78 N. The cut counts the 0.56 N as normal force of the head, where no material is left. The likely cause: a part of a
+  shaft that touches two faces has only one plane. `tests/studies/contact/stuck_rows.cpp` lists both presses, so `traps` shows
+  them and fails for any other.
 """
 
 COMPARED = """\
@@ -92,81 +101,99 @@ COMPARED = """\
 
 ![Both forces on the same motions](%s)
 
-The paper's force gives way to a hand that presses on. It grows with the area in touch, here to %s N, and ends where
-the ball is wholly inside; behind a wall of two voxels it pushes onward. A press of 3 mm meets no resistance along %s mm
-of it in the thick wall and %s mm at the thin one. The proxy stays in front, and its force grows with the depth.
+The paper's force does not stop a hand that presses on. The force grows with the contact area, here to %s N, and it is zero
+when the ball is wholly inside. Behind a wall of two voxels it pushes the hand onward. A hand that goes 3 mm deep meets no
+resistance along %s mm of its way in the thick wall, and along %s mm at the thin wall. The proxy stays in front of the
+wall, and its force grows with the depth of the hand.
 
 The paper's force acts only near a face. A hand that moves farther than this zone in one tick can cross the face between
-two ticks. The table has the lowest speed at which this happens for some phase of the ticks. The proxy is measured up to
-10 m/s; faster hands are stopped by the supervisor.
+two ticks. The table has the lowest speed at which this happens for at least one phase of the ticks. The proxy is measured
+up to 10 m/s, because the supervisor stops a faster hand.
 
 | update rate | paper, %s | paper, %s | proxy, both |
 |---:|---:|---:|---:|
 %s
-Both slide smoothly over a ball: at 50 mm/s the force changes by at most %s %% (paper) and %s %% (proxy) of its mean
-from tick to tick, and stays within %s and %s degrees of the normal.
+Both forces are smooth while the tool slides over a ball. At 50 mm/s the force changes from tick to tick by at most %s %%
+(paper) and %s %% (proxy) of its mean. Its direction stays within %s (paper) and %s (proxy) degrees of the normal.
 
 """
 
 # Group, title, text.
 GROUPS = [
     ("walls", "Walls", """\
-A hand makes random steps of 0.1 to 10 m/s at a tilted wall. The cylinder and the bur of `scenes/fluted_bur.toml` are
-also rotated at random. There is no supervisor. If a tick has no query left for a push, the tool may stay 0.05 voxels deep
-(`kWedged` of the sweep), less what a mesh reaches beyond its samples: 0.03 voxels of the bur (docs/theory.md 4.2)."""),
+A hand makes random steps of 0.1 to 10 m/s at a tilted wall, without a supervisor. The cylinder and the bur of
+`scenes/fluted_bur.toml` are also rotated at random. *Sunk* is the depth of the tool in the wall. The tool may stay 0.05
+voxels deep if a tick has no query left to push it out (`kWedged` of the sweep). From this a mesh subtracts the length by
+which it reaches beyond its samples, 0.03 voxels for the bur (docs/theory.md 4.2)."""),
     ("air", "In air", """\
-A tool moves to and fro along tilted walls, so near and so fast that the hand moves 2.4 to 80 voxels in a
-tick. `--check` prints the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2). The force is that of
-the coupling with 0.4 N/mm and the hand's velocity, the larger one of no damping and of 1 N s/mm, the ends of what a scene may have: a
-spring of a thousandth of a voxel that is left in air would be newtons."""),
-    ("rests", "Where a ball comes to rest", """\
-Offsets from the ideal solid at random tilts. On edges from the volume's own iso-surface, since trilinear density
-has no sharp edge."""),
-    ("slides", "Slides", """\
-The step is the change of the force from tick to tick over its mean. The rotation of the normal alone makes 1.04 % at
-R 40 and 4.5 % at R 14; there the limit is 0.08 N or twice the mean. `CT` has edges blurred by a deviation of one voxel,
-and noise of 2 %."""),
-    ("shapes", "Tools that are no balls", """\
-At rest on flats of any tilt and on sharp edges of 90 degrees, the edges against the volume's own iso-surface; and
-sliding at 50 mm/s over a ball of R 40, 2 voxels deep. Limits are 1.5 times those of the ball.
+A tool moves to and fro along tilted walls. It is so close and so fast that the hand moves 2.4 to 80 voxels in a tick.
+`--check` prints the speed up to which a scene has no drag, at any distance from a wall (docs/theory.md 4.2).
 
-On CT with noise a rim or a point touches at one position, where the noise of one voxel makes waves of the surface itself;
-a ball's height and normal are means of some fifty samples. A scene smooths such a volume when it loads it
-(`denoise = "auto"`, docs/theory.md 2.4), and so do the rows with limits; `denoise off` is the same without. `exact
-contact` shows the surface that was not smoothed: height and normal of the iso-surface where the tool's close samples
-touch it at the ideal position, the normal over half a voxel. A contact that averages over no samples would have these
-errors."""),
+The force follows from the spring at 0.4 N/mm and from the velocity of the hand. It is the larger of the forces without
+damping and with 1 N s/mm, the lowest and the highest damping of a scene. So a spring of a thousandth of a voxel that
+remained in air would give several newtons."""),
+    ("rests", "Where a ball comes to rest", """\
+The offset is the distance of the tool from its ideal position of rest, at random tilts. *Convex 40* is a solid ball of
+R 40, *concave 40* a hollow. On edges the offset is relative to the volume's own iso-surface, because trilinear density has
+no sharp edge."""),
+    ("slides", "Slides", """\
+The force step is the change of the force from tick to tick over its mean. The rotation of the normal alone makes 1.04 % at
+R 40 and 4.5 % at R 14. At R 14 the limit is 0.08 N, which is twice the mean. `CT` has edges blurred by a deviation of one
+voxel, and noise of 2 %."""),
+    ("shapes", "Tools that are no balls", """\
+The tools rest on flats of any tilt and on sharp edges of 90 degrees. On edges the offset is relative to the volume's own
+iso-surface. The tools also slide at 50 mm/s over a ball of R 40, 2 voxels deep. The limits are 1.5 times those of the ball.
+
+On CT with noise a rim or a point touches at one position, where the noise of one voxel makes waves of the surface itself.
+The height and normal of a ball are means of some fifty samples. So a scene smooths such a volume when it loads it
+(`denoise = "auto"`, docs/theory.md 2.4). The rows with limits have this smoothing, the rows with `denoise off` do not.
+
+`exact contact` shows the surface that was not smoothed. Its height is that of the iso-surface where the tool's close samples
+touch it at the ideal position. Its normal is a mean over half a voxel. A contact that averages over no samples would have
+these errors."""),
     ("edges", "Along and over sharp edges", """\
-A ball, and a cylinder whose side lies on the edge, two voxels deep on a sharp convex edge of 90 degrees at 0.05
-voxels a tick. The density is the solid's fraction of a cube of two voxels, as in a scan. A ramp of the distance from
-the solid has a ridge that voxels do not hold: its trilinear iso-surface is a row of bumps about a voxel apart, and from
-bump to bump the position nearest to the hand jumps."""),
+The tool is a ball, or a cylinder whose side lies on the edge. It moves along and over a sharp convex edge of 90 degrees,
+two voxels deep, at 0.05 voxels a tick. The density of a voxel is the fraction of solid in a cube of two voxels, as in a
+scan. A ramp of the distance from the solid would have a ridge that voxels cannot represent. Its trilinear iso-surface would
+be a row of bumps about a voxel apart, and the position nearest to the hand would jump from bump to bump."""),
     ("isos", "Low and high iso", """\
-Tools at rest on flats of any tilt and on balls of R 14, with an iso that is not half of full density. The angle between force and normal may be 1.5 times that at an iso of 0.45."""),
+Tools rest on flats of any tilt and on balls of R 14. The iso is not half of full density. The limit of the angle between
+force and normal is 1.5 times the angle at an iso of 0.45."""),
     ("cutting", "Cutting by force", """\
-The whole servo with `[cut] model = "preston"` and a ball of radius 1 mm. A hand moves it over a flat; presses it on
-the flat with a force that rises to 1.2 N and falls again, however far the flat gives way; and lowers it into a crown at
-the rate of enamel, at the worst of nine positions. `GE tooth` is a real tooth by CT, below `--data` or `$KERF_DATA`."""),
+The whole servo runs with `[cut] model = "preston"` and a ball of radius 1 mm, in three motions:
+
+* a hand moves the ball over a flat (rows *removed against the integral of G F*);
+* it presses on the flat with a force that rises to 1.2 N and falls again, however far the flat is cut away (rows *removed by
+  the same force*);
+* it lowers the ball into a crown at the rate of enamel, at nine positions, of which the worst counts (rows *milling into*).
+
+`GE tooth` is a CT of a real tooth, in the folder of `--data` or `$KERF_DATA`."""),
     ("traps", "Traps", """\
-A random search in the whole servo: a hand presses a tool of 0.4 to 1 mm or the fluted bur, half of them with a
-shaft, some with a handpiece, in any orientation, with 0.1 to 1 N for 5 s, from any side and with a tremor of 0.1 mm: into a
-flat, a crown, layers, rubble, pits, shells, plates, or a block that ends at the volume's border. Half of these have
-soft matter in them, which may not be cut in half of those; machinability is 1, 4 or 8 times that of enamel. Of 24
-scenes 18 run in fixed point at 1 kHz and 250 Hz, the others at 8 kHz and in double. If the force is
-above the threshold, volume must be removed. A shaft may carry the load that forces along the normals of its touching
-cylinders can balance; the head carries the rest. A solid that is softer than the iso everywhere must carry no load. 240
-presses; 10,000 with `--only traps`; `--seed` names the first scene."""),
+A random search in the whole servo: a hand presses a tool into a solid with 0.1 to 1 N for 5 s, with a tremor of 0.1 mm. If
+the force is above the threshold, volume must be removed.
+
+* Tools: the shapes with a radius of 0.4 to 1 mm, and the fluted bur. Half of them have a shaft, some a handpiece. Wrist,
+  start and direction are random.
+* Solids: a flat, a crown, layers, rubble, pits, shells, plates, or a block that ends at the volume's border, rotated at
+  random. About half of them contain soft material, which in half of these may not be cut. Machinability is 1, 4 or 8 times
+  that of enamel.
+* Three of four scenes run in fixed point at 1 kHz or 250 Hz, the others at 8 kHz or in double.
+* A shaft may carry the load that forces along the normals of its touching cylinders can balance. The head carries the rest.
+* A solid that is softer than the iso everywhere must carry no load.
+
+A run has 240 presses, or 10,000 with `--only traps`. `--seed` is the number of the first scene."""),
     ("ticks", "Ticks", """\
-On 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow and
-noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, if its data are present, at the GE
-tooth; with goals near and far, and from the start search. The ticks that took longest are repeated from the same
-state, and the fastest repetition counts. The row names the solid at which the tick was found. Times are of the machine
-named above. The limits are for a processor with AVX-512; on another, or a slower one, the paper's tick beside them is
-slower too."""),
+The volumes have 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow
+and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, if its data are present, at the GE
+tooth. The goals are near and far, and some ticks begin with the search for a start position. The costliest ticks are
+repeated from the same state, and the fastest repetition counts. The row names the solid at which the tick was found.
+
+Times are of the machine named above. The limits are for a processor with AVX-512. On a slower processor the paper's tick in
+this table is slower too."""),
     ("hands", "Hands", """\
-An emulated Omni, its driver and the whole servo in virtual time, with `scenes/touch.toml`; `groove` and `cut_cavity`
-have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.128 s that are wholly in contact. One
-count of an encoder is up to 0.06 mm, or 0.024 N. The second stab of `jerk` misses the crown."""),
+An emulated Omni, its driver and the whole servo run in virtual time with `scenes/touch.toml`. The hands `groove` and
+`cut_cavity` have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.128 s that are wholly in
+contact. One count of an encoder is up to 0.06 mm, or 0.024 N. The second stab of `jerk` misses the crown."""),
 ]
 
 
