@@ -9,7 +9,7 @@ SILENT = {
     "kerf-arm": "never",
     "kerf-bridge": "never",
     "kerf-emulator": "never",
-    "kerf-recorder": "`--strict`, and ticks were lost; `--flight`, and a recording could not be written",
+    "kerf-recorder": "with `--strict`: ticks were lost; with `--flight`: a recording could not be written",
     "kerf-volume": "never",
 }
 
@@ -30,18 +30,18 @@ def section(root, programs):
     kerf = programs.said(root / "kerf", "--help")
     if "Every command exits with 0: fine; 1: ran, and a check failed; 2: bad input or set-up." not in kerf:
         raise Lack("./kerf --help: other words about exit codes; tests/docs/reference has to follow")
-    rows.insert(0, ("`./kerf`", "ran, and a check failed; of a demo: a program of it did", "bad input or set-up"))
+    rows.insert(0, ("`./kerf`", "a check failed; for a demo: one of its programs failed or crashed", "bad input or set-up"))
     return f"""## Exit codes
 
-0: fine. With 2 comes one line on the standard error: location, value, way out.
+Exit code 0 means success. With exit code 2 a program prints one line on the standard error: location, value, remedy.
 
 {table(("program", "1", "2"), rows)}
 
-`./kerf` with the short name of a program ends as that program does. Also:
+`./kerf` with the short name of a program has the exit code of that program. Other exit codes are:
 
-| code | when |
+| code | reason |
 |---|---|
-| 77 | the machine lacks what a command or a test needs, such as network namespaces for `./kerf demo --two-machines` |
-| 130 | `./kerf demo` was interrupted (Ctrl-C), after the motors went off and the report was written; so was `kerf-lab sweep` or `kerf-lab zwidth`, and what was done is kept |
-| 143 | it was told to end |
+| 77 | the machine has not all that a command or a test needs, such as network namespaces for `./kerf demo --two-machines` |
+| 130 | Ctrl-C: `./kerf demo` ended after the motors went off and the report was written; `kerf-lab sweep` or `kerf-lab zwidth` ended and kept the finished part |
+| 143 | another signal, such as SIGTERM, ended the command |
 """
