@@ -18,39 +18,40 @@ KEPT = re.compile(r"^Rows of `(\w+)` are of another machine: (.*)$", re.MULTILIN
 ABOUT = """\
 # Performance
 
-Made by `./kerf bench kernels --page docs/performance.md`; every figure comes from one run, nothing is
-typed by hand. Machines are noisy: compare the ratios, which divide two figures of the same run.
+`./kerf bench kernels --page docs/performance.md` makes the tables up to *Pictures*. All figures come from one run; none is typed in.
+Machines are noisy: compare the ratios, which divide two figures of the same run.
 
-One tick of the servo's kernels on 256 x 256 x 161 voxels, at the costliest position of each kind; no result is
-kept from tick to tick.
+Each row is one tick of the servo's kernels on 256 x 256 x 161 voxels, at the costliest position of each kind. No result is kept
+from tick to tick.
 
-* `paper` is the paper's own form at -O2: an array of structures with the stored float gradient, and a dense 5x5x5
-  refresh of the voxels that a cut changed. The ratio of a row is the time of `paper` over that of the row.
-* `reference` is the plain fixed-point code with stored gradients.
-* `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits. Tools that are not rotated use the
-  method `aligned`; tools in any pose (`any`) use `gather` for contact and `splat` for milling. If a machine has no such
-  instruction set, its rows stay as they were, and a line names the machine that measured them.
-* `bytes` is the memory that the tick needs besides the two bytes of each voxel.
+* `paper` is the paper's algorithm at -O2: an array of structures with the stored float gradient, and a dense 5x5x5 refresh of the voxels
+  that a cut changed. The ratio of a row is the time of `paper` over the time of the row.
+* `reference` is plain fixed-point code with stored gradients.
+* `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits. Tools that are not rotated use the method
+  `aligned`. Tools in any pose (`any`) use `gather` for contact and `splat` for milling.
+* Rows of an instruction set that the measuring machine does not have stay unchanged. A line names the machine that measured them.
+* `bytes` is the memory that the tick needs in addition to the two bytes of each voxel.
 
 """
 
 QUERIES = """
 ## A query of the swept contact
 
-The contact of a tool at one position, from samples of its surface: a ball of radius 8 voxels (805 samples)
-and a cylinder of radius 5 and length 16 (658). `slide` is 2 voxels deep in a ball of radius 40, `half` is half inside
-a flat solid, `immersed` is wholly inside. `turn` rotates the samples. A tick takes 2 or 3 queries while the tool
-slides, and at most 32. The ratio is the time of the plain loop, `scalar`, over that of the row.
+A query computes the contact of a tool at one position from samples of its surface. The tools are a ball of radius 8 voxels (805 samples)
+and a cylinder of radius 5 and length 16 voxels (658 samples). In `slide` the tool is 2 voxels deep in a ball of radius 40, in `half` it is
+half inside a flat solid, and in `immersed` it is wholly inside. `turn` rotates the samples. A tick needs 2 or 3 queries while the tool
+slides, and at most 32. The ratio is the time of the plain loop, `scalar`, over the time of the row.
 
 """
 
 LAYOUT = """
 ## Layout of the volume
 
-The servo stores its volume linearly, x fastest. The alternative is bricks of 8x8x8 voxels. The first rows compare
-copies of the tool's box from both layouts, with warm caches and (`cold`) after 96 MB went through the caches before each
-tick; the ratio is the time of the linear copy over that of the row. The other rows are one tool in volumes of three sizes;
-their ratio is the time in the smallest volume over that of the row.
+The servo stores its volume linearly, x fastest. The alternative is bricks of 8x8x8 voxels.
+
+* The rows `copy` compare copies of the tool's box from both layouts, with warm caches, and in `cold` after 96 MB went through the caches
+  before each tick. The ratio is the time of the linear copy over the time of the row.
+* The other rows compare one tool in volumes of three sizes. The ratio is the time in the smallest volume over the time of the row.
 
 """
 

@@ -12,37 +12,46 @@ import text
 ABOUT = """\
 ## Pictures
 
-Made by `./kerf bench pictures --page docs/performance.md`; every figure comes from one run, nothing is
-typed by hand but the paper's. Machines are noisy: compare figures of the same run.
+`./kerf bench pictures --page docs/performance.md` makes the tables of this section. All figures come from one run; only the figures of
+the paper are typed in. Machines are noisy: compare figures of the same run.
 
-The time of a frame: update of the renderer and drawing of the volumes, without tool and panel, with a camera at rest.
-The volume is a synthetic molar (`visualizer/bench/bench_tooth.cpp`). It fills about the same fraction of its grid as the
-paper's padded tooth, and it fills the picture.
+The table shows the time of a frame: update of the renderer and drawing of the volumes, without tool and panel, with a fixed camera. The
+volume is a synthetic molar (`visualizer/bench/bench_tooth.cpp`). It fills about the same fraction of its grid as the paper's padded
+tooth, and it fills the picture.
 
-* `cropped`: the grid without the air around the tooth; the picture is the same.
+* `cropped`: the grid has no air around the tooth; the picture is the same.
 * `static`: the whole picture is drawn.
-* `10^3`, `16^3`: the whole picture is drawn after a ball of so many voxels was cut.
-* `partial`: only the pixels that this cut can have changed are drawn, as the visualizer does while the camera rests.
-* `fps`: one over the median wall time; `cpu ms`: the median, summed over the threads. Each figure is of 3 to 10 frames.
-* `paper`: the frame rate that the paper reports for its technique of the same kind, static / while milling, on its own
+* `10^3`, `16^3`: the whole picture is drawn after a ball of this many voxels was cut.
+* `partial`: only the pixels that this cut can have changed are drawn, as in the visualizer while the camera does not move.
+* `fps` is one over the median wall time. `cpu ms` is the median CPU time, summed over the threads. Each figure is from 3 to 10 frames.
+* `paper fps` is the frame rate that the paper reports for its technique of the same kind, static / while milling, on the paper's
   hardware. It does not predict the rate of this machine.
 
-If `gl` below is a software OpenGL, the figures of `iso`, `blend`, `surface` and `slices` do not hold for a graphics card.
+If `gl` below is a software OpenGL, the figures of `iso`, `blend`, `surface` and `slices` are not valid for a graphics card.
 
 """
 
 GRADIENTS = """
 ### Gradients
 
-The cost of `--gradient` for `iso` on the padded 256x256x161 volume, and the angle between its normals and the exact ones
-on a ball of 28 voxels radius, root mean square and for 99 of 100 pixels: `ball` has a border that is antialiased over two
-voxels, `noisy` has noise of 1.5 % of full density too, and `milled` is the hollow that a ball has cut: its voxels are
-nearly full or empty. `1x1x2`, `1x1x5` and `1x1x10` are the ball in voxels so thick, for 99 of 100 pixels. Each gradient is
-stored in 8 bytes a voxel and computed again around a cut. `adaptive` uses 15x15x15 voxels if their normal differs
-little from that of `farid5`, which uses 5x5x5 voxels; at an edge it differs, and `farid5` is used. If the edges of a voxel
-differ, `adaptive` uses equal lengths along each axis, five of the longest edges to each side; the others count voxels. `surface`, `cast`, exported surfaces and the page
-shade by the same gradients; their tests hold `adaptive` to 3 degrees for 99 of 100 points of a ball from 1x1x1 to 1x10x10.
-`corners` inverts the highest frequency of the voxels, so it draws a hatching on smooth surfaces; `central` draws rings.
+The table shows the cost of `--gradient` for `iso` on the padded 256x256x161 volume. It also shows the angle between the normals and the
+exact normals on a ball of 28 voxels radius, as root mean square and for 99 of 100 pixels (p99):
+
+* `ball` has a border that is antialiased over two voxels.
+* `noisy` also has noise of 1.5 % of full density.
+* `milled` is the hollow that a ball has cut; its voxels are nearly full or empty.
+* `1x1x2`, `1x1x5` and `1x1x10` are the ball in voxels of these edges, for 99 of 100 pixels.
+
+Each gradient is stored in 8 bytes for each voxel and computed again around a cut.
+
+* `adaptive` uses 15x15x15 voxels if their normal differs little from the normal of `farid5`. At an edge it differs, and `adaptive` uses
+  `farid5`, which has 5x5x5 voxels. If the edges of a voxel differ, `adaptive` uses equal lengths along each axis, five of the longest edges to
+  each side; the other gradients count voxels.
+* `corners` inverts the highest frequency of the voxels, so it draws hatching on smooth surfaces.
+* `central` draws rings.
+
+`surface`, `cast`, exported surfaces and the page shade by the same gradients. Their tests limit `adaptive` to 3 degrees for 99 of 100
+points of a ball in voxels from 1x1x1 to 1x10x10.
 
 """
 
