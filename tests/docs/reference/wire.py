@@ -136,7 +136,8 @@ the device:
 
 {drawing(file, 'namespace kerf {')}
 
-A report is refused if its length differs from the first report's, or if the word at 12 is neither 0 nor 1.
+If the word at 6 is 1, the words at 0 are new counts of d, e, f and not currents. A report is refused if its length differs from the
+first report's, or if its word at 12 is not 0 or 1.
 
 **Speaks first**: the host, with currents of 0. From then on the device reports every 1 ms. After {plain(number('kWatchdogS'))} s without a packet from the
 host the device switches its amplifiers off.
