@@ -98,15 +98,15 @@ def page(root, _programs):
     headers = "\n".join(f"### kerf/{name}\n\n`#include \"kerf/{name}\"`\n\n```cpp\n{declarations(root, name)}\n```\n" for name in HEADERS)
     return f"""# Interfaces for C++, C and Python
 
-[Packages](compatibility.md#below-a-prefix-for-your-own-programs) has the build of a program that uses the headers, [Python](python.md) has
-examples. Only what stands here is promised to stay within a version.
+[Packages](compatibility.md#below-a-prefix-for-your-own-programs) describes how to build a program that uses the headers.
+[Python](python.md) has examples. Only what this page lists is promised to stay within a version.
 
 ## C++ and C
 
 {headers}
 ## Python: import kerf
 
-`TICK` is the dtype of a row, with the columns of [the log](log.md). `Segment` is that of [kerf_reader](compatibility.md#python).
-`Error`, a `ValueError`, has one line: location, value, remedy.
+`TICK` is the dtype of a row, with the columns of [the log](log.md). `Segment` is the class of [kerf_reader](compatibility.md#python).
+`Error` is a `ValueError` with one line: location, value, remedy.
 
 {python}"""

@@ -7,18 +7,19 @@ from source import Lack, Source, same, table
 
 # What a field's name and its comment in the source do not say.
 MEANINGS = {
-    "layout_major": "another one: another layout", "layout_minor": "of the layout", "abi_hash": "hash of this layout",
-    "total_bytes": "of the segment", "config_hash": "of all settings of the run", "tick_ns": "length of a servo tick",
-    "volume_count": "volumes", "off_state": "of the ring of ticks", "off_dirty": "of the ring of boxes",
-    "off_volume_table": "of the descriptors", "state_record_bytes": "size of a `TickRecord`",
-    "dirty_record_bytes": "size of a `DirtyRecord`", "off_scene": "of the scene's text", "scene_bytes": "length of the scene's text",
-    "lifecycle": "where the run stands, above", "nx": "voxels along x", "ny": "along y", "nz": "along z",
+    "layout_major": "major version; another one is another layout", "layout_minor": "minor version", "abi_hash": "hash of this layout",
+    "total_bytes": "size of the segment", "config_hash": "hash of all settings of the run", "tick_ns": "length of a servo tick",
+    "volume_count": "number of volumes", "off_state": "offset of the ring of ticks", "off_dirty": "offset of the ring of boxes",
+    "off_volume_table": "offset of the descriptors", "state_record_bytes": "size of a `TickRecord`",
+    "dirty_record_bytes": "size of a `DirtyRecord`", "off_scene": "offset of the scene's text", "scene_bytes": "length of the scene's text",
+    "lifecycle": "state of the run, above", "nx": "voxels along x", "ny": "voxels along y", "nz": "voxels along z",
     "log2_brick": "3: a brick has 8 voxels along its edge", "bits_per_voxel": "16: a density", "bricks_x": "bricks along x",
-    "bricks_y": "along y", "bricks_z": "along z", "brick_count": "of them in all", "spacing_mm": "of voxels, along x, y, z",
-    "origin_mm": "centre of voxel (0, 0, 0) in the world", "off_versions": "of the version words", "off_bricks": "of the densities",
-    "material": "not used: 0", "iso": "density of the surface, 0 to 65535", "seq": "as of a `TickRecord`", "tick": "of the servo",
-    "lo": "first voxel of the box", "volume": "which one, from 0", "cause": "above", "magic": "above",
-    "session": "session of the run", "flags": "listed above", "build_id": "for messages only", "heartbeat_ns": "of the last finished tick",
+    "bricks_y": "bricks along y", "bricks_z": "bricks along z", "brick_count": "number of bricks",
+    "spacing_mm": "edges of a voxel along x, y, z",
+    "origin_mm": "centre of voxel (0, 0, 0) in the world", "off_versions": "offset of the version words", "off_bricks": "offset of the densities",
+    "material": "not used: 0", "iso": "density of the surface, 0 to 65535", "seq": "as in a `TickRecord`", "tick": "tick of the servo",
+    "lo": "first voxel of the box", "volume": "number of the volume, from 0", "cause": "cause of the change, above", "magic": "above",
+    "session": "session of the run", "flags": "listed above", "build_id": "build of the program, for messages only", "heartbeat_ns": "time of the last finished tick",
     "blocks": "number of blocks that follow", "raw_bytes": "length of the payload before it was packed",
     "payload_bytes": "length of the payload as sent", "ring": "0 ticks, 1 dirty, 2 ticks of two arms", "count": "number of records",
     "first": "index of the first record", "stride": "difference between two indices", "sent_ns": "time when the frame was sent",
@@ -26,8 +27,8 @@ MEANINGS = {
 SAID = {"set_hash": "sum over all blocks that the viewer has after this frame, above",
         "record_bytes": "size of a `TickRecord`", "dirty_bytes": "size of a `DirtyRecord`", "status": "listed above",
         "index": "index of the command, which `last_command` will show", "kind": "listed above",
-        "hi": "end of the box: it does not belong to it",
-        "removed": "density units taken away; by an undo: given back"}
+        "hi": "end of the box (exclusive)",
+        "removed": "density units removed; by an undo: given back"}
 
 
 def meaning_of(file, struct, field, comment):
@@ -67,7 +68,7 @@ def stated_in(*sources):
 def log_columns(root):
     """Unit and meaning of each field of a tick, from the log's page, which has a test of its own."""
     rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| ([^|]*) \| ([^|]+) \| [^|]+ \|$", Source(root, "docs/log.md").text, re.M)
-    return {name: (unit.strip(), meaning.replace(", below", ", told there")) for name, unit, meaning in rows}
+    return {name: (unit.strip(), meaning.replace(", below", ", listed there")) for name, unit, meaning in rows}
 
 
 def numpy_tick(root, programs):
@@ -99,23 +100,23 @@ def segment(root, programs):
     stated = stated_in(fields, Source(root, "shared/segment/tick_table.hpp"))
     told = {"TickRecord": log_columns(root)}
     parts = [f"## `{name}`\n\n{what}{struct_table(homes.get(name, file), name, stated[name], told.get(name))}\n" for name, what in (
-        ("SegmentHeader", "At byte 0, one page. Each word that changes has a line of 64 bytes of its own; `lifecycle` shares that of "
-                          "`heartbeat_ns`. "),
-        ("VolumeDescriptor", "At `off_volume_table`, one for each volume. `origin_mm` is the place of the centre of voxel "
+        ("SegmentHeader", "At byte 0, one page. Each word that changes has another line of 64 bytes, except that `lifecycle` shares the "
+                          "line of `heartbeat_ns`. "),
+        ("VolumeDescriptor", "At `off_volume_table`, one for each volume. `origin_mm` is the position of the centre of voxel "
                              "(0, 0, 0) in the world. "),
         ("TickRecord", "At `off_state`: a ring, slot = index mod `state_slots`. [The log](log.md) has the same rows, and "
-                       "tells when each field is valid. "),
-        ("DirtyRecord", "At `off_dirty`: a ring, slot = index mod `dirty_slots`. One box of voxels that changed. "))]
+                       "lists when each field is valid. "),
+        ("DirtyRecord", "At `off_dirty`: a ring, slot = index mod `dirty_slots`. A record is one box of voxels that changed. "))]
     same(fields.path, ["SegmentHeader", "VolumeDescriptor", "TickRecord", "DirtyRecord"], stated)
     return f"""# The shared segment
 
-What the controller writes and every reader maps, read-only: layout {file.number('kLayoutMajor')}.{file.number('kLayoutMinor')}, little-endian, natural alignment, offsets
-instead of pointers. An installed kerf and `python/kerf_reader` have readers ([installation](compatibility.md#installation)). The
-magic is `KERFSHM1`. `abi_hash` is a hash of the layout below: a reader with another hash refuses the segment.
+The controller writes the segment, and each reader maps it read-only. This is layout {file.number('kLayoutMajor')}.{file.number('kLayoutMinor')}: little-endian, natural alignment,
+offsets instead of pointers. An installed kerf and `python/kerf_reader` have readers ([installation](compatibility.md#installation)).
+The magic is `KERFSHM1`. `abi_hash` is a hash of the layout below. A reader with another hash refuses the segment.
 
-The controller named NAME listens at `$XDG_RUNTIME_DIR/kerf/NAME.sock`, else `/tmp/kerf-$UID/NAME.sock`. NAME
-is its `--name` (`kerf`); that of a demo is `demo-PID`, or what `./kerf demo` has as `--name`. It answers a connection with
-{8 + 4 + 4 + 8 + 8} bytes (magic, major, minor, `abi_hash`, `session_id`) and the segment's file descriptor.
+A controller listens at `$XDG_RUNTIME_DIR/kerf/NAME.sock`, else `/tmp/kerf-$UID/NAME.sock`. NAME is the value of its `--name`, by
+default `kerf`. For a demo NAME is `demo-PID`, unless `./kerf demo --name` gives another one. The controller answers a connection with
+{8 + 4 + 4 + 8 + 8} bytes (magic, major, minor, `abi_hash`, `session_id`) and the file descriptor of the segment.
 
 | from | what |
 |---|---|
@@ -123,16 +124,16 @@ is its `--name` (`kerf`); that of a demo is `demo-PID`, or what `./kerf demo` ha
 | `off_volume_table` | a `VolumeDescriptor` for each volume |
 | `off_scene` | the scene as JSON, `scene_bytes` long |
 | `off_state` | ring of `TickRecord`, {file.number('kStateSlots')} slots |
-| `off_state_2` | the same ring of the second arm; 0: the scene has one arm. Index i of both rings is one tick, and the second's record is published first |
+| `off_state_2` | the same ring for the second arm; 0: the scene has one arm. Index i of both rings is the same tick. The record of the second arm is published first |
 | `off_dirty` | ring of `DirtyRecord`, {file.number('kDirtySlots')} slots |
-| `off_versions`, of a volume | u64 for each brick: odd while tick t is written (2 t + 1), even when complete (2 t + 2), 0 never |
+| `off_versions`, of a volume | u64 for each brick: 2 t + 1 (odd) while tick t is written, 2 t + 2 (even) when it is complete, 0 if no tick has written it |
 | `off_bricks`, of a volume | bricks of 8 x 8 x 8 densities, u16, x fastest |
 | `off_labels`, of a volume | u8 for each voxel, x fastest, never changed; 0: none |
 
-To read a record or a brick, read its sequence or version word, copy, and read the word again. Keep the copy if both
+To read a record or a brick, read its sequence or version word, copy the data, and read the word again. Keep the copy if both
 values are equal and even. The servo never waits for a reader.
 
-`lifecycle`: {choices(file, 'Lifecycle')}; from 3 on it is final.
+`lifecycle`: {choices(file, 'Lifecycle')}. From 3 on it is final.
 `cause` of a box: {choices(file, 'DirtyCause')}.
 
 {chr(10).join(parts)}"""

@@ -20,7 +20,7 @@ import script_keys
 import wire
 from source import Lack
 
-BY = "Made by `tests/docs/reference/make.py` from what the programs say and from their source.\n"
+BY = "Made by `tests/docs/reference/make.py` from the output of the programs and from their source.\n"
 
 
 def page(text):

@@ -302,7 +302,7 @@ def bridge(root):
             name, size = structs[kind], re.search(rf"sizeof\({structs[kind]}\) == (\d+)", file.text)[1]
             if not name.startswith(kind.removeprefix("k")) or file.struct(name)[1] != int(size):
                 raise Lack(f"{file.path}: {name} is not what its magic or its size says")
-            rows = struct_table(file, name).replace("where the run stands, above", "state of the run ([segment](api.md#the-shared-memory))")
+            rows = struct_table(file, name).replace("state of the run, above", "state of the run ([segment](api.md#the-shared-memory))")
             rows = rows.replace("| u32 | above |", f"| u32 | `{mark}` |", 1)
             yield f"### `{name}`, `{mark}`\n\n{rows}\n"
     kinds = "\n".join(f'    * {value} `{word}`. {comment[0].upper()}{comment[1:]}' for word, value, comment in command.enumerators("CommandKind"))
