@@ -25,9 +25,9 @@ The page measures two contact forces, derived in docs/theory.md and in docs/forc
   hand to the proxy;
 * the paper's force (`"paper"`) is the sum of the gradients of density inside the tool.
 
-Both are measured as the servo runs them: in fixed point, by the fastest kernels of this machine. Unless stated, a voxel is
-0.1 mm, a tick 1 ms, the tool a ball with a diameter of 16 voxels, and a face a ramp of density over two voxels. R 40 is a
-radius of 40 voxels, and *sd* a standard deviation. In the tables *must* is the limit of a row; *aim* is not checked.
+Both are measured as the servo runs them: in fixed point, by the fastest kernels of the machine named below. Unless stated, a
+voxel is 0.1 mm, a tick 1 ms, the tool a ball with a diameter of 16 voxels, and a face a ramp of density over two voxels. R 40
+is a radius of 40 voxels, and *sd* a standard deviation. In the tables *must* is the limit of a row; *aim* is not checked.
 
 [Promises](#promises-and-their-tests) lists what kerf promises, with the tests. [Accuracy](#accuracy-of-each-setting)
 measures each setting of both forces.
@@ -106,8 +106,8 @@ when the ball is wholly inside. Behind a wall of two voxels it pushes the hand o
 resistance along %s mm of its way in the thick wall, and along %s mm at the thin wall. The proxy stays in front of the
 wall, and its force grows with the depth of the hand.
 
-The paper's force acts only near a face. A hand that moves farther than this zone in one tick can cross the face between
-two ticks. The table has the lowest speed at which this happens for at least one phase of the ticks. The proxy is measured
+The paper's force acts only in a zone near a face. A hand that moves across this zone in one tick can pass the face without
+any force. The table has the lowest speed at which this happens for at least one phase of the ticks. The proxy is measured
 up to 10 m/s, because the supervisor stops a faster hand.
 
 | update rate | paper, %s | paper, %s | proxy, both |
