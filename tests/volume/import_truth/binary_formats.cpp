@@ -155,7 +155,7 @@ void set_qform(Nifti& f) {
 constexpr NiftiRow kNiftiRows[] = {
     {"each type, byte order, orientation (sform); NIfTI-1 and -2; gzip", kRead, "", [](Nifti&) {}},
     {"qform alone", kRead, "", set_qform},
-    {"qform and sform alike", kRead, "",
+    {"qform and sform that agree", kRead, "",
      [](Nifti& f) {
        set_qform(f);
        f.sform = 2;
@@ -562,7 +562,7 @@ struct StackRow {
 };
 
 constexpr StackRow kStackRows[] = {
-    {"in the order of the numbers of their names; --spacing given", kRead, "",
+    {"slices in the order of the numbers in their names; --spacing given", kRead, "",
      [](Stack&, const TemporaryFolder&) {}},
     {"no spacing", kAsked, "--spacing",
      [](Stack& f, const TemporaryFolder&) { f.out.options.spacing_mm.reset(); }},
@@ -571,7 +571,7 @@ constexpr StackRow kStackRows[] = {
        f.left_out = static_cast<std::size_t>(1 + f.draw.below(f.out.truth.size[2] - 2));
      },
      4},
-    {"other files beside them", kRead, "",
+    {"other files in the same folder", kRead, "",
      [](Stack&, const TemporaryFolder& folder) {
        folder.write("notes.txt", "x");
        folder.write(".hidden", "x");

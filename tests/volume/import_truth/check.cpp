@@ -165,13 +165,13 @@ std::string import_page() {
   page
       << "## Which files are read\n\n"
          "Each row is a situation in which a test writes numbered volumes: each voxel has its own "
-         "value "
-         "and a known\nposition in the patient (LPS). *Read*: each voxel comes back with its value "
-         "and position. *Refused*: one line\ngives the reason, and nothing is read. *Asked*: the "
-         "line names the option that is missing. The test writes the\nfiles byte by byte from the "
-         "specifications of the formats (`tests/volume/import_truth`), in random sizes,\nspacings, "
-         "orientations and types; `.ci/all import` tries 10,000. It also makes this part of the "
-         "page:\n\n"
+         "value and a known\nposition in the patient (LPS). *Read*: each voxel comes back with its "
+         "value and position. *Refused*: one line\ngives the reason, and nothing is read. *Asked*: "
+         "the line names the option that is missing. *Read or\nrefused*: some files of this kind "
+         "are read, others are refused. *First words*: the beginning of this line.\n\nThe test "
+         "writes the files byte by byte from the specifications of the formats "
+         "(`tests/volume/import_truth`),\nin random sizes, spacings, orientations and types. "
+         "`.ci/all import` tries 10,000 of them. The test also makes\nthis part of the page:\n\n"
          "    KERF_WRITE_PAGE=1 build/release/bin/test_volume_readers -tc='*own-volume.md*'\n";
   constexpr std::uint64_t kSeeds = 6;
   std::string format;

@@ -364,7 +364,7 @@ constexpr SeriesRow kSeriesRows[] = {
          v.values[i] = table[static_cast<std::size_t>(v.stored[i])];
        }
      }},
-    {"pixel padding, of any type and height, becomes air", kRead, "",
+    {"pixel padding of any type and value becomes air", kRead, "",
      [](Series& f) {
        if (f.draw.coin())
          pad(f, VoxelType::int16, f.draw.of({-2000.0, -32768.0, 32767.0}));
@@ -375,7 +375,7 @@ constexpr SeriesRow kSeriesRows[] = {
      [](Series& f) {
        pad(f, VoxelType::uint16, 63536, f.draw.of({65535.0, 60000.0}));
      }},
-    {"bits stored at the upper end (HighBit 15 of 12)", kEither, "bit",
+    {"12 bits stored at the upper end of 16 (HighBit 15)", kEither, "bit",
      [](Series& f) {
        Numbered& v = f.volume();
        number_anew(f.draw, v, VoxelType::uint16, 12);
@@ -462,13 +462,13 @@ constexpr SeriesRow kSeriesRows[] = {
          set.set(0x00200032, "DS", ds(v.position(0, 0, k), kind == 2 ? 1 : 10));
        });
      }},
-    {"SpacingBetweenSlices that is negative or another", kRead, "",
+    {"SpacingBetweenSlices that is negative or contradicts the positions", kRead, "",
      [](Series& f) {
        f.each([&](DataSet& set, int) { set.set(0x00180088, "DS", ds(f.draw.of({-1.0, 9.0}))); });
      }},
     {"no PixelSpacing", kAsked, "--spacing",
      [](Series& f) { f.each([](DataSet& set, int) { set.erase(0x00280030); }); }},
-    {"a slice of another size, spacing or orientation", kEither, "",
+    {"one slice has another size, spacing or orientation", kEither, "",
      [](Series& f) {
        Numbered& v = f.volume();
        DataSet& set = f.slices.back();
@@ -493,11 +493,11 @@ constexpr SeriesRow kSeriesRows[] = {
                  ds(v.position(0, 0, k) + (0.3 * k * v.spacing_mm[2]) * v.axes[1]));
        });
      }},
-    {"a screenshot, a report or an unreadable file of another series beside them", kRead, "",
+    {"a screenshot, a report or an unreadable file of another series in the same folder", kRead, "",
      [](Series& f) { add_unfit(f, "1.2.3"); }},
     {"a screenshot, a report or an unreadable file of the same series", kEither, "",
      [](Series& f) { add_unfit(f, kSeries); }},
-    {"a text beside them", kRead, "",
+    {"a text file in the same folder", kRead, "",
      [](Series& f) { f.folder.write(f.draw.word("A.txt|zz"), "no image"); }},
     {"an encoding that is unknown", kRefused, "",
      [](Series& f) {

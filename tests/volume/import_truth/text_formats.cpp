@@ -149,7 +149,7 @@ constexpr Row kNrrdRows[] = {
     {"each type, byte order, orientation", kRead, "", [](TextFile&) {}},
     {"encoding gzip, bzip2, hex, text", kRead, "",
      [](TextFile& f) { pack(f, f.draw.word("gzip|gz|bzip2|bz2|hex|txt|text|ascii")); }},
-    {"voxels in a file of their own", kRead, "",
+    {"voxels in a separate file", kRead, "",
      [](TextFile& f) {
        f[f.draw.of({"data file", "datafile"})] = f.detached = "voxels.raw";
      }},
@@ -259,7 +259,7 @@ constexpr Row kNrrdRows[] = {
          f.more += (i % 3 == 0 ? "# comment: " : "key" + std::to_string(i) + ":=") + "v\n";
        }
      }},
-    {"fields that leave voxels alone (content, labels, thicknesses, centers, measurement frame)",
+    {"fields that do not affect voxels (content, labels, thicknesses, centers, measurement frame)",
      kRead, "",
      [](TextFile& f) {
        f.more = f.draw.of({"content: a: b\n", "labels: \"x\" \"y\" \"z\"\n", "thicknesses: 9 9 9\n",
@@ -383,7 +383,7 @@ constexpr Row kMetaRows[] = {
        f["BinaryData"] = "False";
        f.data = ascii_of(f.volume());
      }},
-    {"voxels in a file of their own, after a header or not", kRead, "",
+    {"voxels in a separate file, which may begin with a header", kRead, "",
      [](TextFile& f) {
        f["ElementDataFile"] = f.detached = "voxels.raw";
        const int kind = f.draw.below(3);
@@ -444,7 +444,7 @@ constexpr Row kMetaRows[] = {
      [](TextFile& f) { before_data(f, "CenterOfRotation", "1 2 3"); }},
     {"AnatomicalOrientation", kEither, "AnatomicalOrientation",
      [](TextFile& f) { before_data(f, "AnatomicalOrientation", f.draw.word("RAI|LPS|RAS")); }},
-    {"fields that leave voxels alone (Modality, Comment, ElementMin)", kRead, "",
+    {"fields that do not affect voxels (Modality, Comment, ElementMin)", kRead, "",
      [](TextFile& f) {
        const auto [key, value] =
            f.draw.of<std::pair<const char*, const char*>>({{"CenterOfRotation", "0 0 0"},
