@@ -69,15 +69,15 @@ enum class CloseCode : std::uint16_t {
 struct HelloMessage {
   std::uint32_t magic;
   std::uint32_t protocol;  ///< version of this protocol
-  std::uint64_t session;   ///< of the run: `SegmentHeader::session_id`
+  std::uint64_t session;   ///< session of the run: `SegmentHeader::session_id`
   std::uint64_t config_hash;
-  std::uint64_t abi_hash;      ///< of the layout; a viewer that reads records needs an equal one
-  std::uint32_t layout_major;  ///< must equal the viewer's, if it reads records
-  std::uint32_t layout_minor;  ///< must equal the viewer's, if it reads records
+  std::uint64_t abi_hash;      ///< hash of the layout; readers of records need an equal one
+  std::uint32_t layout_major;  ///< major layout version; readers of records need an equal one
+  std::uint32_t layout_minor;  ///< minor layout version; readers of records need an equal one
   std::uint32_t tick_ns;
   std::uint32_t flags;
-  std::int64_t server_ns;  ///< when the message was written
-  std::uint64_t start_ns;  ///< of the run; 0 in lock-step
+  std::int64_t server_ns;  ///< time when the message was written
+  std::uint64_t start_ns;  ///< start of the run; 0 in lock-step
   std::uint32_t volume_count;
   std::uint32_t record_bytes;  ///< sizeof(TickRecord)
   std::uint32_t dirty_bytes;   ///< sizeof(DirtyRecord)
@@ -91,9 +91,9 @@ struct FrameHead {
   std::uint32_t magic;
   std::uint32_t flags;
   std::uint64_t session;
-  std::uint64_t frame;    ///< 1, 2, ... since the hello
-  std::uint64_t tick;     ///< of the pass
-  std::int64_t taken_ns;  ///< when the snapshot of the pass was taken
+  std::uint64_t frame;    ///< number of the frame since the hello: 1, 2, ...
+  std::uint64_t tick;     ///< tick of the pass
+  std::int64_t taken_ns;  ///< time when the snapshot of the pass was taken
   std::int64_t heartbeat_ns;
   std::uint64_t set_hash;  ///< over all blocks that the viewer holds after this frame
   std::uint32_t lifecycle;
@@ -133,7 +133,7 @@ static_assert(sizeof(RecordsHead) == 48);
 /// Reply to one command.
 struct ReplyMessage {
   std::uint32_t magic;
-  std::uint32_t sequence;  ///< of the command
+  std::uint32_t sequence;  ///< number of the command that is answered
   std::uint32_t status;    ///< ReplyStatus
   std::uint32_t index;     ///< Reply::index
 };
@@ -152,7 +152,7 @@ static_assert(sizeof(AckMessage) == 24);
 struct CommandMessage {
   std::uint32_t magic;
   std::uint16_t kind;  ///< CommandKind
-  std::uint16_t arm;   ///< of `select_tool`: 0 the first, 1 the second; other kinds: 0
+  std::uint16_t arm;   ///< arm of `select_tool`: 0 the first, 1 the second; other kinds: 0
   std::uint32_t argument;
   std::uint32_t sequence;  ///< chosen by the viewer; the reply repeats it
 };
@@ -163,11 +163,11 @@ static_assert(sizeof(CommandMessage) == 16);
 /// presented. From a viewer with the right to command: its own view, or that it presents no longer.
 struct ViewMessage {
   std::uint32_t magic;
-  std::uint32_t presenter;  ///< 0 nobody, 1 another viewer, 2 the receiver; of a viewer: 1 itself,
-                            ///< 0 no longer
-  double eye_mm[3];         ///< in the world; the last one if nobody presents
-  double target_mm[3];      ///< the middle of the picture
-  double up[3];             ///< upright in the picture
+  std::uint32_t presenter;  ///< from the server: 0 nobody, 1 another viewer, 2 the receiver; from a
+                            ///< viewer: 1 the viewer presents, 0 it presents no longer
+  double eye_mm[3];         ///< position of the eye in the world; if nobody presents, the last one
+  double target_mm[3];      ///< position in the world at the middle of the picture
+  double up[3];             ///< direction in the world that is upright in the picture
 };
 static_assert(sizeof(ViewMessage) == 80);
 enum class Presenter : std::uint32_t { nobody = 0, another = 1, receiver = 2 };

@@ -35,7 +35,7 @@ static_assert(sizeof(SegmentCommand) == 64);
 
 enum class ReplyStatus : std::uint32_t {
   accepted = 0,  ///< queued; applied within `kCommandSlots` ticks
-  busy = 1,      ///< queue full, or a bridge waits for another one or for the controller: try again
+  busy = 1,      ///< queue full, an earlier command still open, or no controller: try again
   refused = 2,   ///< unknown kind, argument or reserved word out of range, or no right to command
 };
 

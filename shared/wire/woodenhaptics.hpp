@@ -76,8 +76,7 @@ inline constexpr std::uint8_t kReportId = 0;
 ///     device -> host                       host -> device
 ///      0  encoders a, b, c                  0  motor currents a, b, c in mA
 ///      6  encoders d, e, f (a gimbal)       6  0 = currents, 1 = set the encoders
-///     12  1 = calibration button            8  0, or new counts of a, b, c; those of d, e, f
-///                                              then take the place of the currents
+///     12  1 = calibration button            8  0, or new counts of a, b, c if 6 is 1
 ///
 /// The report ID, wooden::kReportId, is not part of these bytes. Any thread; no function allocates,
 /// blocks or throws.

@@ -56,8 +56,8 @@ packet. A packet with another value is refused.
 
 * 1 to 160 ahead: accepted.
 * 161 to 16,000 ahead: refused. A second packet, 1 to 160 ahead of the refused one, is accepted.
-* Any other counter is that of an old packet: refused. After 160 ticks without an accepted packet, when the motors are off, a
-  second packet that is 1 to 160 ahead of the refused one is accepted.
+* Any other counter is that of an old packet: refused. But after 160 ticks without an accepted packet (the motors are then off)
+  a second packet is accepted that is 1 to 160 ahead of the refused one.
 
 **Counts to joints**, in rad, with c = 2 pi / {number('kCountsPerRev')}. `dock` is the count in the inkwell. q1 turns the turret to the left. q2 is the
 angle of the thigh above the horizontal. q3 is the angle of the forearm from straight down, outwards. All three angles are
@@ -95,7 +95,7 @@ A serial stream of packets of {number('kPacketBytes')} printable bytes. How a ho
 
 {drawing(file, 'namespace kerf {')}
 
-A report with any other byte in one of these places is refused. The numbers of the host are motor torques in counts, up to
+A report with a byte that this layout does not allow is refused. The numbers of the host are motor torques in counts, up to
 +-{number('kMotorCountMax')}. The numbers of the device are encoder counts.
 
 **Speaks first**: the host, with a packet without torque. The device answers each packet of the host with one report.
@@ -172,7 +172,7 @@ def cartesian(root):
         forces = re.search(r"\.forces = \{([\d., ]+)\}", row)
         word = re.search(r'\.word = "(\w+)"', row)[1]
         rows.append(f"| {word} | {step} | {quantum} | {'yes' if wrist == 'true' else 'no'} "
-                    f"| {'anywhere, by a button' if 'has_dock = false' in row else 'in its inkwell'} "
+                    f"| {'by a button, at any position' if 'has_dock = false' in row else 'in its inkwell'} "
                     f"| ({low}) to ({high}) | {forces[1] if forces else '3.3, 0.88, 0.5'} |")
     if len(rows) != 3:
         raise Lack(f"{kinds.path}: figures of {len(rows)} devices, not 3; tests/docs/reference has to follow")
@@ -184,6 +184,8 @@ vendor's interface and the packets below, which are kerf's. The emulator sends a
 `--front socket` and `udp`.
 
 {drawing(file, 'namespace kerf {')}
+
+The byte at 11 sets the device's light: 0 asks the user to act, 1 the servo is ready, 2 a fault.
 
 The orientation is the tool's: at identity the shaft points up. kerf refuses a packet whose position is more than {number('kFarthestUm') // 1000} mm on an axis,
 or whose orientation has a length that differs from 1 by more than 1 %. The force at 28 depends on the sender:
@@ -282,8 +284,8 @@ one packet** of the device as listed above, with no header or trailer. The emula
 | greeting, 9 bytes | 0 | u8 x 8 | the same 8 bytes as a target |
 | | 8 | u8 | 0: the client leads the hand; 1: another client leads it, and the emulator closes the connection |
 
-A window that leads the emulated hand connects to the emulator's `--hand-socket`, reads the greeting, and sends one target in each
-picture. A hello for an Omni in lock-step at 1000 Hz, in Python with `struct`: `pack("<8s2B2xI4x", b"kerf\\0hi\\1", 0, 1, 1000)`.
+A window that leads the emulated hand connects to the emulator's `--hand-socket`, reads the greeting, and sends one target for
+each picture that it draws. A hello for an Omni in lock-step at 1000 Hz, in Python with `struct`: `pack("<8s2B2xI4x", b"kerf\\0hi\\1", 0, 1, 1000)`.
 """
 
 
@@ -332,8 +334,9 @@ begins with a head, which has a table below. The head's flags and values, and th
   other offsets are 0. Flags: {file.number('kMayCommand')} this viewer may send commands, {file.number('kTwoArms')} the run has two arms.
 * frame: a u64 version for each block, a u32 number for each block, then the payload, which is the blocks. Flags: {file.number('kPacked')} packed,
   {file.number('kLastOfPass')} last of a pass (the viewer then has the volumes of `tick`), {file.number('kRunEnded')} the controller has gone.
-  Blocks are numbered from 0: first the scene's text in blocks of {file.number('kTextBlockBytes')} bytes; then the densities of each brick, {file.number('kDensityBlockBytes')} bytes,
-  volume by volume; then the labels of each brick, {file.number('kLabelBlockBytes')} bytes, of the volumes that have labels. Zeros fill the last block of text.
+  Blocks are numbered from 0: first the scene's text, {file.number('kTextBlockBytes')} bytes a block. The densities follow, volume by volume,
+  {file.number('kDensityBlockBytes')} bytes for each brick. The last blocks are the labels of the volumes that have labels, {file.number('kLabelBlockBytes')} bytes for each brick.
+  Zeros fill the last block of text.
 * records: `count` records of a ring of the segment, with the segment's layout. Record i has the index `first + i * stride`.
   Flag {file.number('kPacked')}: packed. In a run of two arms `ring` is 2 instead of 0: each record is the first arm's record of a tick, followed by the
   second arm's.
