@@ -324,7 +324,7 @@ def energy_panels(kerf):
 # --- the page
 
 HEAD = """\
-# Held against published numbers
+# Compared with published numbers
 
 `./kerf lab reproduce --page docs/reality.md` makes this page. Each number in the column `kerf` comes from a run of kerf's code; none
 is typed in.
@@ -332,6 +332,7 @@ is typed in.
 * A *match* is within the tolerance of its row.
 * A *miss* is printed and [explained](#the-misses), never left out.
 * A row is *shown* without a verdict if its source does not publish something that a verdict needs.
+* If kerf's number is not the same quantity as the published number, the row names it after `kerf:`.
 
 If a parameter is not published, only orders of magnitude, exponents and directions are compared, and a match means no more than that.
 
@@ -460,14 +461,14 @@ def page(data, regions_link, energy_link):
 
 REGIONS = """\
 The axes are those of Diolaiti et al.: damping b over K T, and friction f over K times the encoder step D. Each square stands for two
-runs against a spring wall of 1 N/mm: a push of 0.05 N from the wall's surface, and a hit at 200 mm/s with 1 N. The two runs are the
-presses in the tables below. Both have 0.1 kg, 1 kHz, encoder steps of 0.1 mm, no delay, exact numbers and no limits.
+runs against a spring wall of 1 N/mm, called *presses* in the tables below: a push of 0.05 N from the wall's surface, and a hit at
+200 mm/s with 1 N. Both have 0.1 kg, 1 kHz, encoder steps of 0.1 mm, no delay, exact numbers and no limits.
 
 * Right of b/(KT) = 1/2 and above f/(KD) = 1/2 the wall is passive.
 * Left of b/(KT) = 1/2 and above f/(KD) = 1/2 the wall is not passive. The tip still settles, because friction dissipates the energy
   that sampling adds.
-* Below f/(KD) = 1/2 friction does not hold the force of one encoder step. Near this line the tip settles after one or both of the
-  presses, and far below it after neither.
+* Below f/(KD) = 1/2 friction cannot hold the tip against the force of one encoder step. Near this line the tip settles after one or
+  both of the presses, and far below it after neither.
 
 """
 
