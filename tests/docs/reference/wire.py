@@ -230,7 +230,7 @@ reads, and some others.
   device sets the force to 0.
 * **Frame**, in m: X right, Y away from the user, Z up. kerf's frame has x = X, y = Z, z = -Y and its origin at
   ({origin}) m of the service's frame. The origin is kerf's choice.
-* **Emulated versions** (`--profile`): {", ".join(f"`{word}`" for word in profiles)}.
+* **Emulated versions** (`--profile`): {", ".join(f"`{word}`" for word in profiles)}. `kerf-arm` needs 3.1 or newer and refuses 3.0.
 * **HTTP**: `GET /version`, `/devices`, `/settings/devices/force_scale`. The emulator's reply to `/version` has a member
   `kerf_emulator`, from which `kerf-arm` reads whether the emulator runs in lock-step.
 * **Faults** (`--bus-fault`): {", ".join(f"`{word}`" for word in faults)}.
