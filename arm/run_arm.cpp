@@ -56,7 +56,7 @@ void declare(Arguments& app, ArmOptions& o) {
            "omega: if it is not initialised, let the SDK do so, which MOVES THE ARM");
   app.option("--peak", o.peak_n,
              "omega: highest force in N; needed for another device of Force Dimension: what it "
-             "bears all the time by its data sheet")
+             "gives continuously by its data sheet")
       .within(0.1, force_figures(Personality::omega).peak_n);
   app.option("--service", o.service,
              "inverse3: where its service listens, [HOST:]PORT (default: 127.0.0.1:10001)");

@@ -23,7 +23,7 @@ namespace kerf {
 namespace {
 
 constexpr std::string_view kWayToNewManifest =
-    "; copy the recording again, or kerf record check --repair makes it anew";
+    "; copy the recording again, or kerf record check --repair rebuilds it";
 
 // The only list of figures: text, JSON and the reader all use it.
 template <class Summary, class Visit>

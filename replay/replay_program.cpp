@@ -18,7 +18,7 @@ namespace {
 constexpr const char* kAbout =
     "Runs a recording again, tick by tick, without device and clock.\n\n"
     "Each tick is compared with the recorded one, to the last bit. With another scene, setting, "
-    "law or arithmetic it shows what would have been felt: the hand moves as it did, the volumes "
+    "law or arithmetic it shows what the force would have been: the hand moves as it did, the volumes "
     "start as they were.";
 
 /// An option that stands for the setting of a law.

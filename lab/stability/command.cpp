@@ -132,7 +132,7 @@ void tell(const Part& part, std::ostream& out) {
 
 constexpr const char* kMapped = "damping,stiffness";
 
-/// `kerf-lab zwidth`: which stiffness and damping a device bears, measured, beside the theory.
+/// `kerf-lab zwidth`: which stiffness and damping is stable on a device, measured, beside the theory.
 class ZwidthCommand final : public LabCommand {
  public:
   explicit ZwidthCommand(Arguments& program);
@@ -162,7 +162,7 @@ class ZwidthCommand final : public LabCommand {
 
 ZwidthCommand::ZwidthCommand(Arguments& program)
     : LabCommand(program, "zwidth",
-                 "which stiffness and damping a device bears, beside the theory") {
+                 "which stiffness and damping is stable on a device, beside the theory") {
   std::array<AxisId, kAxisCount> all{};
   for (std::size_t i = 0; i < kAxisCount; ++i) all[i] = static_cast<AxisId>(i);
   axes_.declare(app_, all);
@@ -310,7 +310,7 @@ MapSpec ZwidthCommand::spec(std::ostream& out) const {
   for (const AxisId axis : {AxisId::hit, AxisId::start}) {
     if (!arm_ || texts[index_of(axis)].empty()) continue;
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
-                   ": the whole arm has hits of its own; leave one of the two out");
+                   ": the whole arm has its own hits; leave one of the two out");
   }
   if (!arm_ && !axes_.texts[index_of(AxisId::mode)].empty()) {
     throw HilError("--mode: one axis is rigid; add --arm, or leave it out");

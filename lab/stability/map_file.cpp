@@ -269,12 +269,12 @@ Part read_part(const std::string& path) {
   } catch (const JsonError& error) {
     throw HilError(path + ": line " + std::to_string(number + 1) + " is not one of a map (" +
                    error.what() + "); " + (number > 0 ? "cut it off there, or " : "") +
-                   "remove the file to begin anew");
+                   "remove the file to start over");
   }
-  if (number == 0) throw HilError(path + ": no part of a map; remove the file to begin anew");
+  if (number == 0) throw HilError(path + ": no part of a map; remove the file to start over");
   if (part.shard.index < 1 || part.shard.index > part.shard.count) {
     throw HilError(path + ": shard " + shard_text(part.shard) +
-                   " is no part of a whole; remove the file to begin anew");
+                   " is no part of a whole; remove the file to start over");
   }
   try {  // also a law that another program has
     check_spec(part.spec);
@@ -285,13 +285,13 @@ Part read_part(const std::string& path) {
   for (const auto& [index, column] : part.columns) {
     if (index >= columns.size() || !part.shard.has(index)) {
       throw HilError(path + ": has columns that its shard " + shard_text(part.shard) +
-                     " has not; remove the file to begin anew");
+                     " has not; remove the file to start over");
     }
     if (!column.cells.empty() && column.cells.size() != part.spec.stiffness_n_per_mm.size()) {
       throw HilError(path + ": column " + std::to_string(index) + " has " +
                      std::to_string(column.cells.size()) + " cells for " +
                      std::to_string(part.spec.stiffness_n_per_mm.size()) +
-                     " stiffnesses; remove the file to begin anew");
+                     " stiffnesses; remove the file to start over");
     }
   }
   return part;
@@ -345,10 +345,10 @@ PartWriter::PartWriter(const std::string& path, const MapSpec& spec, const Shard
   if (map_of(found) == map_of(part_) && found.program != part_.program) {
     file_->refuse(
         "another program measured it, which may move other bits; name another file, or "
-        "remove it to begin anew");
+        "remove it to start over");
   }
   if (head_of(found) != head_of(part_)) {
-    file_->refuse("has another map or shard; name another file, or remove it to begin anew");
+    file_->refuse("has another map or shard; name another file, or remove it to start over");
   }
   part_.columns = std::move(found.columns);
   file_->cut_to_whole_lines();

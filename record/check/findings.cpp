@@ -34,7 +34,7 @@ void Findings::add_to_manifest(const std::string& what) {
   if (seal_ == Seal::whole) return add(kManifestName, what);
   in_manifest_ = true;
   add(kManifestName, what,
-      "; copy the recording again, or kerf record check --repair makes it anew");
+      "; copy the recording again, or kerf record check --repair rebuilds it");
 }
 
 bool Findings::compare(const Json& object, std::string_view key, const std::string& shown_key,

@@ -50,7 +50,7 @@ bool is_hex(std::string_view text, std::size_t digits) {
 }
 
 std::string refusal(const fs::path& file, const std::string& what) {
-  return file.string() + ": " + what + ", so no manifest is made anew; copy the recording again";
+  return file.string() + ": " + what + ", so no manifest is rebuilt; copy the recording again";
 }
 
 /// A recorder writes a row of clock.npy before its checksum.

@@ -40,7 +40,7 @@ RowFacts row_facts(const fs::path& folder, std::size_t arms, std::uint32_t tick_
     throw DamagedRecording((folder / tick_log_name(arms - 1)).string() + ": " +
                            std::to_string(logs.back().rows()) + " rows, and " +
                            std::string(kTickLogName) + " has " + std::to_string(log.rows()) +
-                           ", so no manifest is made anew; copy the recording again");
+                           ", so no manifest is rebuilt; copy the recording again");
   }
   std::optional<LossesOfRows> losses;
   RowFacts out;

@@ -109,7 +109,7 @@ has the two CRC-32. What no reader can tell, and a replay alone may show:
 * in logs of earlier versions, which have no `crc32`, the facts that only the manifest has;
 * all that only a lost manifest said, after it was made anew.
 
-A `manifest.json` that is lost or wrong is made anew by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as
+A `manifest.json` that is lost or wrong is rebuilt by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as
 `manifest-old.json`. What only that said (session, versions, how the run ended) is unknown then, since nothing proves it, and `info` says
 who made the manifest anew. If a checksum that can still be read in the wrong one (`files`, `first_rows`, `config_hash`) is not that of its
 file, the file was changed, too: one line names it, and all stays as it is. With the manifest lost altogether, or no JSON, nothing is left

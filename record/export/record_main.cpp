@@ -261,7 +261,7 @@ class OtherCommands {
         columns_(app.command("columns", "what each column of a log says, as a page")) {
     check_.option("DIR", folder_, "folder of a recording").required();
     check_.flag("--repair", repair_,
-                "make manifest.json anew from scene and ticks if it is lost or wrong");
+                "rebuild manifest.json from scene and ticks if it is lost or wrong");
     grab_.option("--name", name_, "name of the controller").shows_default();
     live_.option("--name", to_.name, "name of the controller").shows_default();
     live_.option("--udp", to_.udp, "where to: [ADDRESS:]PORT").shows_default();

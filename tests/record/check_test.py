@@ -90,7 +90,7 @@ class TestCheck(Recordings):
         self.assertIn('"servo" stands twice in it', check(log)[2])
 
     def test_a_member_of_another_kind_is_named_by_all(self):
-        again = "; copy the recording again, or kerf record check --repair makes it anew"
+        again = "; copy the recording again, or kerf record check --repair rebuilds it"
         for key, text, kind in (("missed_before_start", "-1", "a number of ticks"), ("missed_before_start", str(10**30), "a number of ticks"),
                                 ("missed_before_start", "null", "a number of ticks"), ("lost_ticks", "0.5", "a number of ticks"),
                                 ("tick_ns", "0", "a whole number of ns above 0"), ("tick_ns", str(1 << 32), "a whole number of ns above 0"),

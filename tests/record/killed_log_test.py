@@ -94,7 +94,7 @@ class TestKilledLog(unittest.TestCase):
         path.write_text(path.read_text().replace('"compiler": "', '"compiler": "b', 1))
         code, said, wrong = run("kerf-record", "check", log, "--repair")
         self.assertEqual((code, said, wrong.count("\n")), (1, "", 1), wrong)
-        self.assertIn("ticks.npy: does not begin with the row that manifest.json has the checksum of, so no manifest is made anew; copy", wrong)
+        self.assertIn("ticks.npy: does not begin with the row that manifest.json has the checksum of, so no manifest is rebuilt; copy", wrong)
 
     def test_a_recorder_may_be_killed_between_clock_and_manifest(self):
         log = self.copy(self.log)

@@ -105,7 +105,7 @@ class TestRepair(Recordings):
                     was = path.read_bytes()
                     code, said, wrong = check(log, "--repair")
                     self.assertEqual((code, said), (1, ""))
-                    self.assertRegex(wrong, rf"^kerf-record: {log}/{name}[^\n]*(checksum|begin)[^\n]*, so no manifest is made anew; copy the recording again\n$")
+                    self.assertRegex(wrong, rf"^kerf-record: {log}/{name}[^\n]*(checksum|begin)[^\n]*, so no manifest is rebuilt; copy the recording again\n$")
                     self.assertEqual((path.read_bytes(), (log / "manifest-old.json").exists()), (was, False))
 
     def test_a_wrong_scene_is_not_repaired_in_a_log_without_its_checksum(self):

@@ -102,7 +102,7 @@ Option declare_look(Arguments& app, VisualizerOptions& o, Words& words) {
 void declare_run(Arguments& app, VisualizerOptions& o) {
   app.option("--seconds", o.seconds, "end after this time").within(0.0, 1e6);
   app.option("--ends-after", o.ends_after_s,
-             "in a window: this much servo time after arming the run ends; the user is told two "
+             "in a window: this much servo time after arming the run ends; the window says so two "
              "minutes and ten seconds before")
       .within(0.0, 1e6)
       .shown_as("S");
