@@ -77,7 +77,7 @@ void declare(Arguments& app, ArmOptions& o) {
       .within(50, 10'000)
       .shows_default();
   app.option("--opening-s", o.opening_s,
-             "patience until the device is open (with --auto-init at least 60)")
+             "longest wait until the device is open (with --auto-init at least 60)")
       .within(0.1, 600)
       .shows_default();
   app.flag("--once", o.once, "end when the first controller has ended");

@@ -111,7 +111,7 @@ def run(root, binaries, words):
     for line in device_file.report(found, motion.period_s):
         print(line)
     _write(options.out, device_file.text_of(found, motion.period_s, options.log))
-    print(f"kept in {options.out}; a map of it: kerf lab zwidth --device {options.out}")
+    print(f"written to {options.out}; for a map: kerf lab zwidth --device {options.out}")
 
 
 def main():

@@ -63,7 +63,7 @@ def remarks(found):
         yield "Coulomb friction acts against the direction of the motion as a whole, f v / |v|, rather than on each axis alone"
     missing = [axis for axis in "xyz" if axis not in found.moved]
     if missing:
-        yield f"{', '.join(missing)} did not move by 20 steps of the encoder: nothing is known of it; free it, or give it more force"
+        yield f"{', '.join(missing)} did not move by 20 steps of the encoder: it was not identified; free it, or give it more force"
     for begin, end in found.spoilt:
         yield f"{begin:.1f} to {end:.1f} s is left out: something else moved the tip, as a hand or a knock does"
     if found.slips:
@@ -71,7 +71,7 @@ def remarks(found):
         more = f"; {len(found.slips) - 1} more follow" if len(found.slips) > 1 else ""
         yield f"a slip at {at:.2f} s: {', '.join(axes)} jumped by {size:.2g} mm in one tick, which no force explains{more}; left out"
     for one, other, correlation in found.together:
-        yield f"{one} and {other} cannot be told apart here (correlation {correlation:+.2f}): each interval has the other in it"
+        yield f"{one} and {other} cannot be separated (correlation {correlation:+.2f}): each interval includes the error of the other"
     for name, value, low, high in zip(NAMES, found.values, found.low, found.high):
         if np.isfinite(value) and not name.startswith(("weight", "spring", "delay")) and name[-2:] not in ("xy", "xz", "yz"):
             if high - low > abs(value):
@@ -80,5 +80,5 @@ def remarks(found):
         yield f"the model does not fit: {found.unexplained:.0%} of the force has no explanation by mass, friction and delay"
     coloured = [axis for axis, p in zip("xyz", found.whiteness) if p < WHITE]
     if coloured:
-        yield (f"what is left of {', '.join(coloured)} is not white (Ljung and Box, p < {WHITE}): the arm has more to it than the model, "
+        yield (f"what is left of {', '.join(coloured)} is not white (Ljung and Box, p < {WHITE}): the arm is more complex than the model, "
                "and intervals may be too narrow")

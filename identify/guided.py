@@ -204,8 +204,8 @@ def explain(say, told, options, seconds):
     what = told["device.personality"]
     say(f"{what} at --port {options.port}" if options.port else f"an emulated {what}; --port PORT: a real one (docs/first-hour.md)")
     say(f"the device will move by itself for {seconds:.0f} s, by at most {float(told['limits.force_n']):g} N: free {MOST_MM:.0f} mm around its tip")
-    say("take it out of its rest, to the middle of its space, and let go: hands off while it moves")
-    say("to stop it: Ctrl-C; grasping it is safe, too, and spoils the seconds in which you do")
+    say("take it out of its dock, to the middle of its workspace, and let go: hands off while it moves")
+    say("to stop it: Ctrl-C; you may also grasp it; those seconds are lost")
 
 
 def record(binaries, options, seconds=SECONDS):

@@ -55,7 +55,7 @@ def _end(ticks, last, first, period_s):
     if len(after):
         code = int(after["fault"][0])
         yield (f"the motors went off by a fault {(int(after['tick'][0]) - first) * period_s:.2f} s on: "
-               f"{FAULTS[code] if code < len(FAULTS) else code}; what came before counts")
+               f"{FAULTS[code] if code < len(FAULTS) else code}; the ticks before it are used")
 
 
 def _saturated(rows, first, period_s, limits):
@@ -70,17 +70,17 @@ def _saturated(rows, first, period_s, limits):
         begin = spans[0][0]
         worst = begin + int(np.argmax(asked[begin:spans[0][1]] - given[begin:spans[0][1]]))
         yield (f"a force limit acted for {total:.2f} s in all, the first time {(int(rows['tick'][begin]) - first) * period_s:.2f} s on: "
-               f"{asked[worst]:.3g} N asked, {given[worst]:.3g} N given, which counts")
+               f"{asked[worst]:.3g} N asked, {given[worst]:.3g} N applied; the applied force is used")
 
 
 def _lines(pieces, good, period_s, first):
     if pieces > 1:
-        yield f"the device was off {pieces - 1} times; its longest time in hand is taken, from tick {first} on"
+        yield f"the device was off {pieces - 1} times; its longest time with the motors on is used, from tick {first} on"
     lost = np.count_nonzero(~good)
     if lost:
         where = np.flatnonzero(~good)[0]
         yield (f"{lost} of {len(good)} ticks are missing or without a report, the first {where * period_s:.2f} s on: "
-               "what their forces act on is left out")
+               "the motion under their forces is left out")
 
 
 def read(folder):

@@ -23,7 +23,7 @@ constexpr std::array<const char*, kKinds> kWaits{"",
                                                  "waiting until homed",
                                                  "waiting until parked",
                                                  "waiting until at rest",
-                                                 "waiting to be taken"};
+                                                 "waiting to be picked up"};
 
 /// What the user does about each kind of waiting; an Omni needs no homing.
 struct Deeds {

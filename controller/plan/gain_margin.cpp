@@ -102,10 +102,10 @@ std::string not_counted(const LoadedScene& scene) {
   std::string text = scene.identified ? ", identified" : "";
   const std::string& estimator = scene.servo.velocity.name;
   if (estimator != Difference<DoubleNumbers>::kName && estimator != Foaw<DoubleNumbers>::kName) {
-    text += ", " + estimator + " taken for a bare difference";
+    text += ", " + estimator + " counted as a plain difference";
   }
   const std::string& stabiliser = scene.force.stabiliser.name;
-  if (!stabiliser.empty()) text += ", without what " + stabiliser + " does";
+  if (!stabiliser.empty()) text += ", " + stabiliser + " not counted";
   return text;
 }
 
@@ -260,13 +260,13 @@ std::string device_limit_error(const LoadedScene& scene) {
   const DeviceFigures device = device_figures(scene.device.personality);
   const std::string authority =
       device.gains_from.empty()
-          ? "the most that kerf assumes for " + device_word(scene) + ", as nothing is published"
-          : "the most that " + std::string(device.gains_from) + " has for " + device_word(scene);
+          ? "the maximum that kerf assumes for " + device_word(scene) + "; none is published"
+          : "the maximum of " + std::string(device.gains_from) + " for " + device_word(scene);
   const auto refused = [&](const std::string& what, double value, double most) {
     return scene.path +
            format(": force.%s = %.6g is above %.6g, %s; ", what.c_str(), value, most,
                   authority.c_str()) +
-           "lower it, use --virtual, or say --unchecked-gain";
+           "lower it, use --virtual, or use --unchecked-gain";
   };
   double stiffness = scene.force.stiffness_n_per_mm, damping = scene.force.damping_ns_per_mm;
   std::string of_law;

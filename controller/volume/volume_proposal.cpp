@@ -337,7 +337,7 @@ std::vector<ProposalLine> proposal_lines(const VolumeProposal& p) {
   window << p.window.lo << " .. " << p.window.hi << p.unit()
          << " become density 0 and 1: from what is around the surface";
   body << p.parts << (p.parts == 1 ? " part stays, " : " parts stay, ") << p.parts_away << " with "
-       << p.voxels_away << " voxels in all taken away (couch, holder, specks)";
+       << p.voxels_away << " voxels in all left out (couch, holder, specks)";
   ProposalLine materials{"materials", ""};
   for (const ProposedMaterial& material : p.materials) {
     std::ostringstream text;

@@ -163,12 +163,12 @@ int longest_vox(const VolumeFrame& frame) {
 }
 
 constexpr const char* kAll = ", all of it";
-constexpr const char* kCropped = ", what is solid and three voxels that end in air";
+constexpr const char* kCropped = ", the solid and three voxels around it";
 constexpr const char* kKeepsAll = "--no-crop keeps all";
 
 std::string denoise_text(int passes, const Noise& noise) {
   std::ostringstream text;
-  text << passes << (passes == 1 ? " pass" : " passes") << " against noise of "
+  text << passes << (passes == 1 ? " pass" : " passes") << " of smoothing against noise of "
        << std::round(1000 * noise.share) / 10 << " % of the surface's step";
   return text.str();
 }
@@ -345,7 +345,7 @@ void ImportCommand::print_crop(const VolumeFrame& kept, std::ostream& out) const
 void ImportCommand::print_files(const Files& to, const char* behind_volume, std::ostream& out) {
   line(out, "wrote",
        to.volume.string() + behind_volume + to.scene.string() + ", " + to.preview.string(),
-       "look at the last one first");
+       "look at the picture first");
   line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
 }
 

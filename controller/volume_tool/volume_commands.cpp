@@ -107,7 +107,7 @@ namespace {
 
 [[noreturn]] void refuse_there(const std::filesystem::path& path) {
   throw LoadError(path.string() +
-                  ": is there already; take another name, or --force to replace it");
+                  ": exists already; choose another name, or --force to replace it");
 }
 
 }  // namespace

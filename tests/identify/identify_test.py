@@ -196,14 +196,14 @@ class TestLog(unittest.TestCase):
         ticks["contact_force_n"][120:170], ticks["flags"][120:170] = 2.0, log_motion.CLAMPED
         ticks["contact_force_n"][150] = 4.0
         self.assertEqual(log_motion.motion_of(ticks, 0.001, 1.0, np.zeros(3), limits)[1],
-                         ["a force limit acted for 0.05 s in all, the first time 0.12 s on: 6.93 N asked, 0.866 N given, which counts"])
+                         ["a force limit acted for 0.05 s in all, the first time 0.12 s on: 6.93 N asked, 0.866 N applied; the applied force is used"])
 
     def test_a_fault_that_ended_it_is_named_with_its_time(self):
         ticks = self.rows()
         ticks["phase"][300:], ticks["fault"][300:] = 5, 1
         motion, lines = log_motion.motion_of(ticks, 0.001, 1.0, np.zeros(3))
         self.assertEqual(len(motion.place_m), 300)
-        self.assertEqual(lines, ["the motors went off by a fault 0.30 s on: stale_input; what came before counts"])
+        self.assertEqual(lines, ["the motors went off by a fault 0.30 s on: stale_input; the ticks before it are used"])
         page = (pathlib.Path(ROOT) / "docs/log.md").read_text().split("## Faults")[1]
         self.assertEqual([row.split("|")[2].strip() for row in page.splitlines() if row.startswith("|")][2:2 + len(log_motion.FAULTS)],
                          list(log_motion.FAULTS))

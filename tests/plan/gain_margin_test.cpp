@@ -209,14 +209,14 @@ TEST_CASE("no device takes gains above those of the source that docs/gains.md na
   std::ifstream file(KERF_DOCS "/gains.md", std::ios::binary);
   const std::string page((std::istreambuf_iterator<char>(file)), {});
   for (const Published& row :
-       {Published{Personality::omni, "Omni", "CHAI3D 3.3.0 has for omni", 700, 5},
-        Published{Personality::falcon, "Falcon", "CHAI3D 3.3.0 has for falcon", 3000, 20},
+       {Published{Personality::omni, "Omni", "of CHAI3D 3.3.0 for omni", 700, 5},
+        Published{Personality::falcon, "Falcon", "of CHAI3D 3.3.0 for falcon", 3000, 20},
         Published{Personality::woodenhaptics, "WoodenHaptics",
-                  "its open driver has for woodenhaptics", 1000, 8},
+                  "of its open driver for woodenhaptics", 1000, 8},
         Published{Personality::inverse3, "Inverse3",
-                  "kerf assumes for inverse3, as nothing is published", 1000, 10},
-        Published{Personality::touch, "Touch", "CHAI3D 3.3.0 has for touch", 400, 4},
-        Published{Personality::omega, "omega.3", "CHAI3D 3.3.0 has for omega", 5000, 30}}) {
+                  "that kerf assumes for inverse3; none is published", 1000, 10},
+        Published{Personality::touch, "Touch", "of CHAI3D 3.3.0 for touch", 400, 4},
+        Published{Personality::omega, "omega.3", "of CHAI3D 3.3.0 for omega", 5000, 30}}) {
     CAPTURE(std::string(row.name));
     const double stiffness = row.stiffness / 1000, damping = row.damping / 1000;
     LoadedScene scene = scene_of(stiffness, damping, 1000);
@@ -224,7 +224,7 @@ TEST_CASE("no device takes gains above those of the source that docs/gains.md na
     CHECK(device_limit_error(scene) == "");
     scene.force.stiffness_n_per_mm = 1.001 * stiffness;
     CHECK(is_line(device_limit_error(scene)));
-    CHECK(has(device_limit_error(scene), std::string(", the most that ") + row.source + "; "));
+    CHECK(has(device_limit_error(scene), std::string(", the maximum ") + row.source + "; "));
     scene.force.stiffness_n_per_mm = stiffness;
     scene.force.damping_ns_per_mm = 1.001 * damping;
     CHECK(is_line(device_limit_error(scene)));
@@ -322,7 +322,7 @@ TEST_CASE("a filter of the velocity costs margin, and what is not counted is tol
   scene.servo.velocity = {LawKind::velocity, "mine", {}};
   scene.force.stabiliser = {LawKind::stabiliser, "passivity", {}};
   CHECK(gain_lines(scene, linear(scene))
-            .find("delay 2 ms, mine taken for a bare difference, without what passivity does\n") !=
+            .find("delay 2 ms, mine counted as a plain difference, passivity not counted\n") !=
         std::string::npos);
 }
 

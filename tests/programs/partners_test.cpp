@@ -125,7 +125,7 @@ TEST_CASE(
   };
   for (const auto& [force, told] :
        {Case{"stiffness_n_per_mm = 0.71\nunchecked_gain = true\n",
-             "force.stiffness_n_per_mm = 0.71 is above 0.7, the most that CHAI3D 3.3.0 has for "
+             "force.stiffness_n_per_mm = 0.71 is above 0.7, the maximum of CHAI3D 3.3.0 for "
              "omni"},
         Case{"damping_ns_per_mm = 0.0051\n", "force.damping_ns_per_mm = 0.0051 is above 0.005"},
         Case{"damping_ns_per_mm = 0\n",

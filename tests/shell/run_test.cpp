@@ -60,7 +60,7 @@ TEST_CASE("each device has its own words for what its user does") {
   CHECK(text_of(Personality::falcon, Waiting::homing) ==
         "waiting until homed: pull the grip all the way out, then push it in");
   CHECK(text_of(Personality::woodenhaptics, Waiting::hand) ==
-        "waiting to be taken: move the arm away from its home pose");
+        "waiting to be picked up: move the arm away from its home pose");
   CHECK(text_of(Personality::omni, Waiting::nothing).empty());
 }
 

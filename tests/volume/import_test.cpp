@@ -102,7 +102,7 @@ TEST_CASE("what an import crops ends in air, whatever lay around the solid") {
   const Outcome made = run({"import", scan.string(), "--out", out, "--denoise", "off"});
   CAPTURE(made.err);
   REQUIRE(made.code == 0);
-  CHECK(has(made.out, "what is solid and three voxels that end in air"));
+  CHECK(has(made.out, "the solid and three voxels around it"));
   const VolumeImage image = apply_window(read_volume(out), {0, kDensityMax});
   const VoxelGrid& g = image.grid;
   CHECK(g == VoxelGrid{16, 16, 16});
@@ -199,7 +199,7 @@ TEST_CASE("of two imports to one name at once, one wins and the other gets its l
     child = fork();
     if (child == 0) {
       const Outcome made = run({"import", ball, "--out", out});
-      const bool told = has(made.err, "is there already; take another name, or --force");
+      const bool told = has(made.err, "exists already; choose another name, or --force");
       _exit(made.code == 0 ? 0 : told ? 1 : 2);
     }
   }

@@ -78,7 +78,7 @@ Option declare_look(Arguments& app, VisualizerOptions& o, Words& words) {
            "the tool as a volume of voxels, which the renderer draws as it does the others and "
            "the clip plane cuts too");
   app.flag("--colour-blind", o.settings.colour_blind,
-           "materials in Okabe and Ito's colours, which any colour vision tells apart; in the "
+           "materials in Okabe and Ito's colours, which any colour vision can distinguish; in the "
            "window y");
   app.option("--panels", words.panels,
              "off: headless without panels and banner; a window begins as h leaves it")
