@@ -25,7 +25,7 @@ void add_certificate(Arguments& command, Options& options, const char* meaning) 
 Arguments add_serve(CommandLine& app, ServeOptions& options) {
   Arguments serve =
       app.command("serve", "Shows a running kerf-controller to browsers and to join.");
-  serve.option("--listen", options.listen, "HOST:PORT; off loopback TLS 1.3, always")
+  serve.option("--listen", options.listen, "HOST:PORT; with TLS 1.3, except on loopback")
       .shows_default();
   serve
       .option("--public-url", options.public_url,
@@ -35,7 +35,7 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
   add_certificate(serve, options, "PEM file: certificate, then those above it; else self-signed");
   serve
       .option("--client-ca", options.client_ca,
-              "PEM file: lets in viewers alone whose certificate it signed")
+              "PEM file: only viewers whose certificate it signed may connect")
       .shown_as("FILE");
   serve.option("--token-file", options.token_file,
                "tokens that may watch, any number of times: one a line");
@@ -55,10 +55,12 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
 }
 
 void add_join(CommandLine& app, JoinOptions& options) {
-  Arguments join = app.command("join", "Repeats a far controller's segment here, for all readers.");
+  Arguments join = app.command(
+      "join",
+      "Copies the segment of a controller on another machine to this one, for all readers.");
   join.option("address", options.address, "what serve prints: wss://HOST:PORT/?token=TOKEN")
       .required();
-  join.option("--name", options.name, "of the segment here, as readers ask for it").shows_default();
+  join.option("--name", options.name, "name of the segment on this machine").shows_default();
   join.option("--ca", options.ca, "PEM file: CA that signed the server's certificate")
       .shown_as("FILE");
   join.option("--fingerprint", options.fingerprint,
@@ -68,7 +70,7 @@ void add_join(CommandLine& app, JoinOptions& options) {
   join.option("--token-file", options.token_file,
               "the token, if not in the address, where other users see it")
       .shown_as("FILE");
-  join.option("--wait", options.wait_s, "seconds for the first picture; else for ever")
+  join.option("--wait", options.wait_s, "seconds to wait for the first picture [no limit]")
       .within(0, 86'400)
       .shown_as("S");
   join.option("--most-mib", options.most_mib, "a larger segment is refused")

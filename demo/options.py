@@ -76,7 +76,7 @@ def parse(words):
         if not words or not words[0] or words[0].startswith("--"):
             raise Refusal(f"{name}: no value; see ./kerf demo --help")
         if name in given and name != "--set":
-            raise Refusal(f"{name}: stands there twice; give it once")
+            raise Refusal(f"{name}: is given twice; give it once")
         given.add(name)
         value = words.pop(0)
         if name not in OF_SCENE or name == "--set":

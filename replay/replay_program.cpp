@@ -18,7 +18,8 @@ namespace {
 constexpr const char* kAbout =
     "Runs a recording again, tick by tick, without device and clock.\n\n"
     "Each tick is compared with the recorded one, to the last bit. With another scene, setting, "
-    "law or arithmetic it shows what the force would have been: the hand moves as it did, the volumes "
+    "law or arithmetic it shows what the force would have been: the hand moves as it did, the "
+    "volumes "
     "start as they were.";
 
 /// An option that stands for the setting of a law.
@@ -54,7 +55,7 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   app.option("--until", options.until, "the last tick that is replayed")
       .within(1, 1e18)
       .shown_as("TICK");
-  app.option("--kernels", options.kernels, "those of an instruction set, as scalar or avx2")
+  app.option("--kernels", options.kernels, "of this instruction set, such as scalar or avx2")
       .shown_as("NAME");
   app.option("--set", options.changes.settings,
              "another value of a key of the scene; may be repeated")
@@ -66,9 +67,10 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   app.option("--stabiliser", stabiliser, "another stabiliser: --set force.stabiliser=NAME")
       .shown_as("NAME");
   app.option("--scene", scene, "another scene, on the recorded hand").shown_as("FILE");
-  app.option("--numeric", numeric, "other numbers of the loop").one_of({"fixed", "double"});
+  app.option("--numeric", numeric, "number type of the loop").one_of({"fixed", "double"});
   app.option("--out", options.out, "folder for a recording of the replay").shown_as("DIR");
-  app.option("--plot", options.plot, "forces, places and volumes of both, as SVG").shown_as("FILE");
+  app.option("--plot", options.plot, "forces, positions and removed densities of both runs, as SVG")
+      .shown_as("FILE");
   app.option("--report", options.report, "write what it found as JSON").shown_as("FILE");
   app.option(
          "--watch", options.watch,

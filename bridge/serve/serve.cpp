@@ -147,7 +147,7 @@ void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string
 void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::string& page_token,
                      bool qr) {
   std::cout
-      << "for kerf bridge join, as often as it is shown; for Foxglove with foxglove before the ?\n";
+      << "for kerf bridge join, any number of times; for Foxglove, write foxglove before the ?\n";
   for (const BridgeAddress& place : places_of(setup, port)) {
     std::cout << (place.secure ? "wss://" : "ws://") << place.host_and_port() << place.path
               << "/?token=" << setup.tokens.first() << '\n';

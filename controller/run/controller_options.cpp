@@ -69,7 +69,7 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
       .values(1, 3)
       .shown_as("A[,B,C]")
       .excludes(fills);
-  app.option("--window", raw.window, "source values shown as air and as densest")
+  app.option("--window", raw.window, "source values that become density 0 and 1")
       .values(2, 2)
       .shown_as("LO,HI");
   app.option("--read-seconds", options.overrides.read_cpu_s,

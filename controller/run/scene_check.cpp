@@ -315,7 +315,7 @@ std::string air_lines(const LoadedScene& scene, const SceneCosts& costs) {
   if (*slowest >= kHandSpeedMmPerS) return lines;
   const auto tool = static_cast<std::size_t>(slowest - speeds.begin());
   return lines + "note=tool " + scene.tools[tool].name +
-         " is dragged in air, beside a surface, by a hand faster than " + speed +
+         " has drag in air near a surface if the hand is faster than " + speed +
          " m/s; a higher rate or larger voxels raise that\n";
 }
 

@@ -175,11 +175,12 @@ void check_device(const EmulatorOptions& o) {
   }
   if (o.silence_ms != EmulatorOptions{}.silence_ms && !o.drop_torque) {
     throw HilError(
-        "--silence-ms: the motors hold for ever; give --drop-torque too, or leave it "
+        "--silence-ms: the motors keep their force for ever; give --drop-torque too, or leave it "
         "out");
   }
   if (o.drop_torque && kind_of(o.personality).has_watchdog) {
-    throw HilError("--drop-torque: " + o.device + " lets go by itself; leave it out");
+    throw HilError("--drop-torque: " + o.device +
+                   " switches its motors off by itself; leave it out");
   }
   for (std::size_t i = 0; i < o.plant.size(); ++i) {
     const PlantKey& row = kPlantKeys[i];

@@ -168,7 +168,7 @@ struct WallRun {
   /// Shifts the steps of the encoder against the wall; 0: an edge is on it.
   std::uint64_t seed = 1;
   std::string law = "coupling";    ///< or "linear", "two_sided", or the name of a law
-  std::string estimator = "foaw";  ///< a velocity estimator of docs/forces.md 5.3
+  std::string estimator = "foaw";  ///< a velocity estimator of docs/forces.md 5.2
   bool fixed_point = true;         ///< the servo's numbers; else double
   bool limits = true;              ///< peak and slew of the default device
 };

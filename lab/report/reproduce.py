@@ -169,7 +169,7 @@ def load(path):
         place = f"source {number} ({source.get('name', 'no name')})"
         check_keys(path, place, source, SOURCE_KEYS, set())
         if source["name"] in sources:
-            refuse(path, place, "stands there twice; give it another name")
+            refuse(path, place, "is given twice; give it another name")
         sources[source["name"]] = source
     rows = tables_of(path, data, "row")
     for number, row in enumerate(rows, 1):
@@ -244,7 +244,7 @@ def check_row(path, place, row, sources, functions):
     if (row["unit"] == "text") != (compare["bound"] == "equal"):
         refuse(path, place, f"compare: {row['compare']}: texts are equal or not, numbers are near; take the other")
     if "unknown" in row and compare["percent"]:
-        refuse(path, place, f"compare: {row['compare']}: a source that leaves {row['unknown']} out can be held to an order alone; "
+        refuse(path, place, f"compare: {row['compare']}: a source that leaves {row['unknown']} out can be compared by its order alone; "
                             "take within a factor of N, within N (of an exponent), at least, at most or shown")
 
 

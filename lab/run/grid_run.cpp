@@ -86,7 +86,7 @@ void refuse_twins(std::string_view text, const std::vector<std::string>& values)
   std::set<std::string> seen;
   for (const std::string& value : values) {
     if (seen.insert(meaning_of(value)).second) continue;
-    refuse_axis(text, (value + " stands there twice; name each value once").c_str());
+    refuse_axis(text, (value + " is given twice; name each value once").c_str());
   }
 }
 

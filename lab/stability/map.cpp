@@ -466,7 +466,7 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
   for (const std::string& cell : cells) {
     const auto place = cell_in(cell);
     if (std::ranges::find(places, place) != places.end()) {
-      throw HilError("--cells: " + cell + " stands there twice; name each once");
+      throw HilError("--cells: " + cell + " is given twice; name each once");
     }
     subject.damping_ns_per_mm = place.second;
     const std::string why = impossible(spec, subject);

@@ -11,13 +11,13 @@ namespace kerf {
 /// Where the work at the device port goes to or comes from (docs/forces.md 5.5): the columns of the
 /// tick record, in its order. Their sum is the work that the loop took from the hand.
 enum class EnergySource : std::uint8_t {
-  spring,     ///< the virtual coupling, or the contact force of another law: as if never sampled
+  spring,  ///< the virtual coupling, or the contact force of another law, computed without sampling
   damping,    ///< injected with the spring
   friction,   ///< of the tool on the solid: the part of the spring along the faces
   cutting,    ///< reaction of the removal, friction of the cutter
   limits,     ///< changes by peak, thermal, slew and motor limits
-  hold,       ///< fading in; and what a gap in the reports changed, held or faded
-  leak,       ///< spring and friction are held for a tick and not followed: K T/2 of damping less
+  hold,       ///< fading in; force kept or faded while reports are missing
+  leak,       ///< spring and friction are constant within a tick: K T/2 of damping less
   stabiliser  ///< the work that the stabiliser of the scene added
 };
 inline constexpr std::size_t kEnergySources = 8;

@@ -14,7 +14,7 @@ inline constexpr const char* kDefaultName = "kerf";
 
 /// Kind of a command.
 enum class CommandKind : std::uint32_t {
-  select_tool = 1,  ///< argument: index of the tool in the scene; for the arm in `arm`
+  select_tool = 1,  ///< argument: index of the tool in the scene; `arm` says for which arm
   hold = 2,         ///< argument: 1 stops cutting and force, 0 resumes
   reset = 3,        ///< argument: 0; restores the volumes of tick 0
   undo = 4,         ///< argument: 0; restores the volumes as they were before the last stroke

@@ -112,7 +112,7 @@ class Reproduce(unittest.TestCase):
                 ({"source": '"a"', "source_of": '"a"'}, row + "source_of: unknown")]:
             self.assertTrue(self.refusal(file_of(**changes)).startswith(complaint), (complaint, self.refusal(file_of(**changes))))
         self.assertIn("source 1 (a): no cite; give it", self.refusal(file_of(SOURCE.replace("cite", "site"))))
-        self.assertIn("source 2 (a): stands there twice", self.refusal(file_of(SOURCE + SOURCE)))
+        self.assertIn("source 2 (a): is given twice", self.refusal(file_of(SOURCE + SOURCE)))
         self.assertIn("[[row]]: none; give at least one", self.refusal(SOURCE))
         self.assertIn("rows: unknown; a file has", self.refusal("rows = 1\n" + SOURCE))
         self.assertIn("row: is no list of tables", self.refusal("row = 1\n" + SOURCE))
