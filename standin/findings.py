@@ -32,7 +32,7 @@ NOTES = {
     "lost_link": "times that the device was gone",
     "watchdog": "expiries of the watchdog",
     "in_use": "times that a program opened the device while another one used it",
-    "warm": "times that a motor came to be warm",
+    "warm": "times that a motor became warm",
 }
 OF_ONE = {"forces": "force", "steps": "step", "ticks": "tick", "times": "time", "expiries": "expiry"}  # the notes' first words
 

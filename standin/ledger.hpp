@@ -39,7 +39,7 @@ enum class Row : std::uint8_t {
   lost_link,          ///< times that the device was found to be gone
   watchdog,           ///< expiries (dhd)
   in_use,             ///< times that a program opened a device of another one
-  warm,               ///< times that a motor came to be warm (HD)
+  warm,               ///< times that a motor became warm (HD)
   // numbers
   square_sum_n2,      ///< of the force of all commands
   peak_n,             ///< of a command

@@ -91,7 +91,8 @@ inline constexpr PlantKey kPlantKeys[] = {
     {"device", "coulomb_n", "--coulomb", 0, 10, false, "Coulomb friction at the tip, N",
      set_plant<&PlantParams::coulomb_n>},
     {"device", "joint_inertia_kg_m2", "--joint-inertia", 0, 0.1, false,
-     "of each motor at its joint, kg m^2 (default: part of the tip's mass)", set_joint_inertia},
+     "inertia of each motor at its joint, kg m^2 (default: part of the tip's mass)",
+     set_joint_inertia},
     {"device", "mode_hz", "--mode-hz", 0, 1000, false,
      "structural mode of that inertia, Hz (default: rigid)", set_plant<&PlantParams::mode_hz>},
     {"device", "mode_damping_ratio", "--mode-damping", 0, 1, false, "its damping ratio",
@@ -104,12 +105,12 @@ inline constexpr PlantKey kPlantKeys[] = {
     {"device", "input_delay_cycles", "--input-delay", 0, kMaxDelayCycles, true,
      "bus cycles of 125 us from the encoders to their report",
      set_plant<&PlantParams::input_delay_cycles>},
-    {"hand", "stiffness_n_per_mm", "--hand-stiffness", 0.001, 10, false, "of the grip, N/mm",
-     set_plant<&PlantParams::hand_stiffness_n_per_mm>},
-    {"hand", "damping_ns_per_mm", "--hand-damping", 0, 1, false, "of the grip, N s/mm",
+    {"hand", "stiffness_n_per_mm", "--hand-stiffness", 0.001, 10, false,
+     "stiffness of the grip, N/mm", set_plant<&PlantParams::hand_stiffness_n_per_mm>},
+    {"hand", "damping_ns_per_mm", "--hand-damping", 0, 1, false, "damping of the grip, N s/mm",
      set_plant<&PlantParams::hand_damping_ns_per_mm>},
-    {"hand", "mass_kg", "--hand-mass", 0, 10, false, "of the hand, which moves with the tip, kg",
-     set_plant<&PlantParams::hand_mass_kg>},
+    {"hand", "mass_kg", "--hand-mass", 0, 10, false,
+     "mass of the hand, which moves with the tip, kg", set_plant<&PlantParams::hand_mass_kg>},
 };
 
 /// The value given for each key; if none, the device's own is used.

@@ -19,14 +19,14 @@ enum class FaultKind : std::uint8_t {
   truncate,    ///< packets end early, at a random byte
   corrupt,     ///< one random bit of a packet is wrong
   stick,       ///< the encoder of `axis` stands still
-  jump,        ///< it is off by `counts`
-  wander,      ///< it is off by a random walk of steps up to `counts`
+  jump,        ///< the encoder is off by `counts`
+  wander,      ///< the encoder is off by a random walk of steps up to `counts`
   park,        ///< the device reports that it is parked
-  chatter,     ///< it reports so at random
+  chatter,     ///< the device reports at random that it is parked
   unhome,      ///< the device reports that it is not homed (Falcon)
   noise,       ///< the low bits of the gimbal pots are noise (Omni)
   silence,     ///< the device sends nothing, and still receives
-  unplug,      ///< it neither sends nor receives
+  unplug,      ///< the device neither sends nor receives
   host_late,   ///< the host stands still for `ms`
   replay,      ///< the packets of `ms` ago come again instead of new ones (Omni: they are numbered)
   freeze,      ///< every reading stands still (Falcon, WoodenHaptics)
@@ -34,8 +34,8 @@ enum class FaultKind : std::uint8_t {
   still,       ///< the position stands still while the gimbal turns (Cartesian)
   unreadable,  ///< no reply of the service can be read (Inverse3 by `--port ws`)
   closing,     ///< the service sends a closing frame (Inverse3 by `--port ws`)
-  half_close,  ///< it ends its side of the link, and reads on (Inverse3 by `--port ws`)
-  both_closed,  ///< it ends both sides of the link (Inverse3 by `--port ws`)
+  half_close,  ///< the service ends its side of the link, and reads on (Inverse3 by `--port ws`)
+  both_closed,  ///< the service ends both sides of the link (Inverse3 by `--port ws`)
 };
 
 inline constexpr std::array<std::string_view, 24> kFaultWords{

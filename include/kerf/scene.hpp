@@ -38,7 +38,7 @@ using Settings = std::vector<std::string>;
 
 /// Densities of a volume from memory, x fastest: 0 is air, 65535 is full. The scene treats them as
 /// those of a file: it crops them to the solid with a border of air, smooths noise, and turns the z
-/// axis up (world y), unless its [[volume]] has `crop = false`, `denoise = "none"` and an
+/// axis up (world y), unless its [[volume]] has `crop = false`, `denoise = "off"` and an
 /// `orientation`. `VoxelView` says where the voxels of a servo lie.
 struct Voxels {
   std::array<int, 3> size{};  ///< along x, y, z: up to 1024 each, 512 Mi in all

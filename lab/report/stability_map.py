@@ -263,8 +263,8 @@ def draw_legend(picture, columns, stiffness, top):
     """`stiffness`: of the cells whose verdicts the panels show; None: they show the highest stiffness."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
-    patches = [(RESTS, "comes to rest: proven"), (ACTIVE, "travel small or falling, but the wall goes on giving energy"),
-               (SWINGS, "oscillates (a limit cycle, or worse)"), (UNDECIDED, "undecided: neither settled nor oscillating is proven"),
+    patches = [(RESTS, "settles: proven"), (ACTIVE, "travel small or falling, but the wall goes on giving energy"),
+               (SWINGS, "oscillates (a limit cycle, or worse)"), (UNDECIDED, "undecided: neither settling nor oscillation is proven"),
                (NONE, "not stable even without a wall, or not measured")]
     if any(cell["arithmetic"] for column in columns for cell in column["cells"]):
         patches.insert(3, (ARITHMETIC, "settles except for the rounding of fixed point: below 1 µm, settles in double"))
@@ -275,12 +275,12 @@ def draw_legend(picture, columns, stiffness, top):
 
         exact, other, passive, quantum, swing, energy = line_styles(2)
         groups.append([Line2D([], [], label="measured: first oscillation, of any seed", **swing),
-                       Line2D([], [], label="bar: first oscillations of all seeds", **BAND),
+                       Line2D([], [], label="bar: first oscillation of each seed", **BAND),
                        Line2D([], [], label="measured: first energy that goes on", **energy)])
         seen = [is_seen(values) for values in zip(*(analytic_lines(column) for column in columns))]
         groups.append([Line2D([], [], label=label, **style) for drawn, label, style in zip(
             seen, ("exact for this loop", "exact for another loop: linear two-sided wall,\nbackward difference, no friction, steps, limits",
-                   "passive: stable with any hand", "friction swallows encoder steps (for B = 0)"),
+                   "passive: stable with any hand", "friction exceeds the encoder steps (for B = 0)"),
             (exact, other, passive, quantum)) if drawn])
     for place, group in zip((0.015, 0.42, 0.66), groups):
         picture.legend(handles=group, loc="upper left", bbox_to_anchor=(place, top), borderaxespad=0)

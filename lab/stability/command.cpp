@@ -132,7 +132,7 @@ void tell(const Part& part, std::ostream& out) {
 
 constexpr const char* kMapped = "damping,stiffness";
 
-/// `kerf-lab zwidth`: which stiffness and damping is stable on a device, measured, beside the theory.
+/// `kerf-lab zwidth`: which stiffness and damping a device can render, measured, beside the theory.
 class ZwidthCommand final : public LabCommand {
  public:
   explicit ZwidthCommand(Arguments& program);
@@ -162,7 +162,7 @@ class ZwidthCommand final : public LabCommand {
 
 ZwidthCommand::ZwidthCommand(Arguments& program)
     : LabCommand(program, "zwidth",
-                 "which stiffness and damping is stable on a device, beside the theory") {
+                 "which stiffness and damping a device can render, beside the theory") {
   std::array<AxisId, kAxisCount> all{};
   for (std::size_t i = 0; i < kAxisCount; ++i) all[i] = static_cast<AxisId>(i);
   axes_.declare(app_, all);
@@ -175,20 +175,19 @@ ZwidthCommand::ZwidthCommand(Arguments& program)
       .shows_default();
   app_.flag("--quick", quick_, "a small map of both loops, in seconds");
   app_.flag("--arm", arm_, "the whole servo step with an emulated device in place of one axis");
-  app_.option(
-          "--seconds", seconds_,
-          "up to which a hit that is still open is followed, at least 60 [60]; for --portraits, "
-          "of each curve [3]")
+  app_.option("--seconds", seconds_,
+              "longest time of a run, at least 60 [60]; for --portraits, "
+              "of each curve [3]")
       .within(0.1, kLongestLimitS);
   app_.option("--seed", seed_, "shifts the encoders' steps against the wall; 0: an edge lies on it")
       .shows_default();
   app_.option("--seeds", seeds_,
-              "so many from --seed on; a cell has the worst of them [5; 2 with "
+              "number of seeds, from --seed on; a cell has the worst verdict [5; 2 with "
               "--quick]")
       .within(1, static_cast<int>(kMostSeeds));
   app_.option("--jobs", jobs_, "threads [all cores]").within(1, 1024);
   app_.option("--shard", shard_, "only part i of n, into --part").shown_as("i/n");
-  app_.option("--part", part_, "keep finished columns here, and go on from those that it has")
+  app_.option("--part", part_, "keep finished columns in this file, and continue from it")
       .shown_as("FILE");
   app_.option("--merge", merge_,
               "measure nothing: the map of these parts, one of each shard, to the files below")
@@ -211,7 +210,8 @@ ZwidthCommand::ZwidthCommand(Arguments& program)
       "Two are "
       "mapped;\n"
       "each combination of the others is a panel of the picture. docs/stability.md has examples.\n"
-      "Exit codes: 0 fine, 2 bad input or set-up; 130 interrupted, and --part has what is done.");
+      "Exit codes: 0 fine, 2 bad input or set-up; 130 interrupted, and --part has the finished "
+      "columns.");
 }
 
 /// The program's own laws have a trial at both ends of the stiffness before a map runs them: one

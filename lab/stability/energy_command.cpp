@@ -57,7 +57,7 @@ class EnergyCommand final : public LabCommand {
 };
 
 EnergyCommand::EnergyCommand(Arguments& program)
-    : LabCommand(program, "energy", "work at the device port, and what stabilisers cost") {
+    : LabCommand(program, "energy", "work at the device port, and the cost of stabilisers") {
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
   app_.option("--page", page_, "write the figures as their part of a page (docs/stability.md)")
       .shown_as("FILE");

@@ -179,7 +179,8 @@ class ContactCommand final : public LabCommand {
 };
 
 ContactCommand::ContactCommand(Arguments& program)
-    : LabCommand(program, "extremes", "the swept contact against its limits, beside the paper's") {
+    : LabCommand(program, "extremes",
+                 "the swept contact against its limits, beside the paper's force") {
   std::vector<std::string> names;
   for (const Group& group : kGroups) names.emplace_back(group.name);
   Option only = app_.option("--only", only_, "only these groups of rows");
