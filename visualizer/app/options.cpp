@@ -101,9 +101,10 @@ Option declare_look(Arguments& app, VisualizerOptions& o, Words& words) {
 /// How long a run is, and where.
 void declare_run(Arguments& app, VisualizerOptions& o) {
   app.option("--seconds", o.seconds, "end after this time").within(0.0, 1e6);
-  app.option("--ends-after", o.ends_after_s,
-             "in a window: this much servo time after arming the run ends; the window says so two "
-             "minutes and ten seconds before")
+  app.option(
+         "--ends-after", o.ends_after_s,
+         "in a window: this much servo time after arming the run ends; the window says so 120 s "
+         "and 10 s before")
       .within(0.0, 1e6)
       .shown_as("S");
   app.option("--wait", o.wait_s, "seconds to wait for the controller")
