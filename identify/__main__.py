@@ -93,7 +93,7 @@ def run(root, binaries, words):
         import guided
         options.scene = _find_scene(root, options.scene)
         if os.path.lexists(options.log):
-            raise Refusal(f"--log {options.log}: is there already; name a new folder, or identify from it: leave --scene out")
+            raise Refusal(f"--log {options.log}: exists already; name a new folder, or identify from it: leave --scene out")
         try:
             guided.record(binaries, options)
         except guided.Refused as error:

@@ -79,7 +79,8 @@ ImpedanceCommand::ImpedanceCommand(Arguments& program)
   app_.option("--json", json_, "write axes, margins and a row for each frequency").shown_as("FILE");
   app_.option("--plot", plot_, "draw stiffness and damping over frequency (SVG)").shown_as("FILE");
   app_.footer(
-      "Each option has one value. K and B at the hand are -w Im Z and Re Z of the force over the velocity "
+      "Each option has one value. K and B at the hand are -w Im Z and Re Z of the force over the "
+      "velocity "
       "of a\ntip that moves as a sine in the wall; docs/forces.md 5.8.\n"
       "Exit codes: 0 fine, 2 bad input or set-up.");
 }

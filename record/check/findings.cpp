@@ -33,8 +33,7 @@ void Findings::add(const std::filesystem::path& name, const std::string& what,
 void Findings::add_to_manifest(const std::string& what) {
   if (seal_ == Seal::whole) return add(kManifestName, what);
   in_manifest_ = true;
-  add(kManifestName, what,
-      "; copy the recording again, or kerf record check --repair rebuilds it");
+  add(kManifestName, what, "; copy the recording again, or kerf record check --repair rebuilds it");
 }
 
 bool Findings::compare(const Json& object, std::string_view key, const std::string& shown_key,

@@ -111,7 +111,7 @@ class TestGuided(unittest.TestCase):
         for words, line in ((["--scene", "touch"], 'force.model is "proxy", and the motion is a force of a program; give --scene external'),
                             (["--scene", "nosuch"], "nosuch: no such scene file"),
                             (["--scene", "external", "--device", "nix"], "--device"),
-                            (["--scene", "external", "--log", self.home / "there.log"], "is there already; name a new folder"),
+                            (["--scene", "external", "--log", self.home / "there.log"], "exists already; name a new folder"),
                             (["--scene", "external", "--port", "socket:nowhere"], "no device.torque_scale, so the motors stay off"),
                             (["--port", "fw"], "no --scene and no --log")):
             done = subprocess.run([sys.executable, "-B", ROOT / "identify", ROOT, BIN, *words], cwd=self.home, capture_output=True, text=True,

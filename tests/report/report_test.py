@@ -162,7 +162,7 @@ PLOTS = [
     (("contact", "hands"), CONTACT, [], ["touch: force (N)", "touch: removed (mm³)"], "hands"),
     (("accuracy", "plot"), ACCURACY, [], ["force against theory", ">front<"], "rows"),
     (("impedance", "plot"), FELT, [], ["damping as felt (N s/mm)", "device and wall, measured"], "rows"),
-    (("stability_map", "map"), MAP, [], ["rate 500 Hz", "stiffness of the wall, K (N/mm)", "comes to rest"], "columns"),
+    (("stability_map", "map"), MAP, [], ["rate 500 Hz", "stiffness of the wall, K (N/mm)", "settles: proven"], "columns"),
     (("stability_map", "map"), HEIGHTS, [], ["highest stiffness, by the stricter rule (N/mm)"], "columns"),
     (("stability_map", "portraits"), PORTRAITS, [], ["K 1 N/mm, B 0.002 N s/mm", ">push<"], "cells"),
     (("stability", "devices"), STABILITY, [], ["rate 1000 Hz"], "devices"),

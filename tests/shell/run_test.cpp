@@ -284,8 +284,8 @@ TEST_CASE(
   CHECK(air_lines(scene, costs) == "free_of_drag_m_per_s=1.00\n");
   costs.air_speeds_mm_per_s = {2500, 340};
   CHECK(air_lines(scene, costs) ==
-        "free_of_drag_m_per_s=0.34\nnote=tool fissure is dragged in air, beside a surface, by a "
-        "hand faster than 0.34 m/s; a higher rate or larger voxels raise that\n");
+        "free_of_drag_m_per_s=0.34\nnote=tool fissure has drag in air near a surface if the "
+        "hand is faster than 0.34 m/s; a higher rate or larger voxels raise that\n");
 }
 
 TEST_CASE("a volume that ends in a density that contact counts is reported") {

@@ -126,7 +126,7 @@ TEST_CASE("import replaces no file without --force") {
     const auto there = folder.write(name, "mine");
     const Outcome refused = run({"import", ball, "--out", out});
     CHECK(refused.code == 2);
-    CHECK(has(refused.err, name + ": is there already"));
+    CHECK(has(refused.err, name + ": exists already"));
     CHECK(text_of(there) == "mine");
     std::filesystem::remove(there);
   }

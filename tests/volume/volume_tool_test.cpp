@@ -195,7 +195,7 @@ TEST_CASE("a file that is there is replaced where that is asked for, and else st
       CHECK(result.code == 2);
       CHECK(result.out.empty());
       CHECK(result.err.starts_with("kerf-volume: " + (folder / place).string() +
-                                   ": is there already; "));
+                                   ": exists already; "));
     };
     folder.write("there.nrrd", "mine");
     refused("there.nrrd", "there.nrrd");
