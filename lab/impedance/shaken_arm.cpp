@@ -43,8 +43,8 @@ class Fundamental {
   /// At the end of cycle `n` of the shake; the force was held through it.
   void add(std::int64_t n, double tip_mm, double force_n) {
     const double angle = rad_per_cycle_ * static_cast<double>(n);
-    tip_ += std::polar(tip_mm, -angle);
-    force_ += std::polar(force_n, rad_per_cycle_ - angle);
+    tip_ += tip_mm * std::polar(1.0, -angle);
+    force_ += force_n * std::polar(1.0, rad_per_cycle_ - angle);
     ++count_;
   }
   [[nodiscard]] Impedance tip_mm() const { return tip_ * (2 / static_cast<double>(count_)); }

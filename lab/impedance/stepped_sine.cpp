@@ -48,7 +48,7 @@ Impedance held_force(const zwidth::LoopCase& subject, double stiffness, const St
       throw HilError("--law: no number at " + number_text(sine.hz) +
                      " Hz, where the servo would latch a fault; give another one");
     }
-    if (i >= before) sum += std::polar(force_n, -phase(i - before));
+    if (i >= before) sum += force_n * std::polar(1.0, -phase(i - before));
   }
   // What a force that is held for a period has at this frequency, from the delay on.
   const Impedance jwt(0, phase(1));
