@@ -17,7 +17,7 @@ enum class EnergySource : std::uint8_t {
   cutting,    ///< reaction of the removal, friction of the cutter
   limits,     ///< changes by peak, thermal, slew and motor limits
   hold,       ///< fading in; force kept or faded while reports are missing
-  leak,       ///< spring and friction are constant within a tick: K T/2 of damping less
+  leak,       ///< sample and hold of spring and friction: acts like a damping of -K T/2
   stabiliser  ///< the work that the stabiliser of the scene added
 };
 inline constexpr std::size_t kEnergySources = 8;

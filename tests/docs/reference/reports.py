@@ -15,7 +15,7 @@ REPORTS = [
         ("scene, device, numeric", "", "file of the scene; device and number type of the loop, empty if the scene was not loaded"),
         ("config_hash", "", "hash of all settings; equal if two runs had the same settings"),
         ("rate_hz", "Hz", "rate of the servo"),
-        ("velocity_estimator", "", "name of the estimator in a scene"),
+        ("velocity_estimator", "", "name of the velocity estimator, as in a scene file"),
         ("virtual", "", "true if the run was in lock-step, without a clock"),
         ("end", "", "reason of the end"),
         ("waiting", "", "what the run waited for at the end, the device or the scene; empty if it did not wait"),
@@ -33,7 +33,7 @@ REPORTS = [
         ("peak_force_n", "N", "highest force"),
         ("removed_mm3", "mm3", "volume of solid removed since the last reset, by all arms ([cutting](cutting.md#reset))"),
         ("removed_mm3_by_material", "mm3", "`removed_mm3` for each material of the scene"),
-        ("removed_density_mm3", "mm3", "removed density over full density, since the last reset, by all arms ([cutting](cutting.md#reset))"),
+        ("removed_density_mm3", "mm3", "sum of the density removed since the last reset, by all arms; a voxel of full density counts as its volume ([cutting](cutting.md#reset))"),
         ("forbidden_ms", "ms", "time of contact with each forbidden material"),
         ("sharpness", "", "removal rate of the selected bur at the end over the rate of a new bur ([cutting](cutting.md#burs))"),
         ("pulp_rise_c", "C", "with `cut.pulp`, rise of the pulp's temperature above the body's ([cutting](cutting.md#temperature-of-the-pulp)): at the `end`, the `highest`, and the seconds above 5.5 C (`harm_s`); else null"),
@@ -42,7 +42,7 @@ REPORTS = [
         ("port_minimum_j", "J", "lowest value of this work during the run; below 0 if the loop gave more energy than it took"),
         ("energy_by_source_j", "J", "work at the device port [by source](#sources-of-energy)"),
         ("faults, fault_count", "", "the first 64 faults in the order of time, each with `tick` and `name`; number of faults"),
-        ("events, event_count", "", "the first 64 events around the servo, each with `tick` and `name`; number of events"),
+        ("events, event_count", "", "the first 64 events, each with `tick` and `name`, such as a stall of the loop or a refused command (an event does not end the run); number of events"),
         ("watchdog_trips", "", "times that the loop stood still for 20 ms and the motors went off"),
         ("lost_packets, refused_packets", "", "packets of the device that were lost; packets that were refused"),
         ("link", "", "[counters of the port](#counters-of-a-port)"),
@@ -67,7 +67,7 @@ REPORTS = [
         ("measured_us, measured_p99_us", "us", "median and 99th percentile of that tick"),
         ("stages", "", "list; the parts of a tick, each with its name `stage` and the two rows below"),
         ("operations, timed_operations", "", "largest number of operations in any tick; number in the measured tick"),
-        ("work_us, predicted_us", "us", "time of the largest number on the reference machine; time of the measured tick's number on this machine"),
+        ("work_us, predicted_us", "us", "computed time of `operations` on the reference machine; computed time of `timed_operations` on this machine"),
         ("arrays, total_bytes", "bytes", "list of arrays, each with `name` and `bytes`; sum of all bytes")]),
     ("Emulator", "`./kerf emulator --report FILE`, and `emulator.json` of a demo.",
      [("hil/program/program.cpp", "void write_run_report("), ("hil/program/program.cpp", "Json injected_list(")],
@@ -76,8 +76,8 @@ REPORTS = [
         ("seconds", "s", "length of the run in the device's time"),
         ("packets_sent, packets_dropped", "", "packets sent to the host; packets that the host did not read"),
         ("packets_withheld", "", "packets that a fault withheld from the host"),
-        ("injected", "", "faults of a script that began: `kind`, `packets` (commands or reports), `at_s`, `changed` "
-         "(packets or readings)"),
+        ("injected", "", "faults of a script that began: `kind`, `packets` (`commands` or `reports`), `at_s` (time in s), `changed` "
+         "(number of packets or readings that the fault changed)"),
         ("commands_received, commands_refused", "", "commands from the host that were accepted; that were refused"),
         ("resyncs", "", "times that the process slept so long that the emulator skipped time"),
         ("wake_us", "us", "delay of the start of a cycle: `p50`, `p99`, `max`"),
@@ -120,26 +120,26 @@ REPORTS = [
         ("tick_ns, start_ns", "ns", "length of a tick; start of the run in CLOCK_MONOTONIC, 0 in lock-step"),
         ("scene, clock", "", "file with the scene; file with the date; `clock` is missing if there is no such file"),
         ("volumes", "", "list of volumes, each with `size_vox`, `spacing_mm`, `initial_hash`"),
-        ("rows, lost_ticks, missed_before_start, end_reason", "", "as in the report of the recorder; `end_reason` is also `running` until the end, `no room` if the disk was full, and `unknown` if the "
-         "manifest was repaired. A repaired manifest has `repaired_by`, the version of kerf that repaired it, no versions of controller and "
-         "recorder, and 0 for `session_id`"),
+        ("rows, lost_ticks, missed_before_start, end_reason", "", "as in the report of the recorder. `end_reason` has three more values: `running` until the end, `no room` if the disk was full, "
+         "`unknown` if the manifest was repaired. In a repaired manifest `repaired_by` is the version of kerf that repaired it, `session_id` is 0, "
+         "and the versions of controller and recorder are missing"),
         ("parts", "", "number of files of each device's log; above 1 only with `--split`"),
         ("first_rows", "", "CRC-32C (`crc32c`) of the first row of each device's log; missing until a row is on the disk"),
         ("gaps", "", "list of gaps, each with `first_index` and `count`"),
         ("arms", "", "2 if the run had two devices, which makes a file `ticks-2.npy`; missing with one device"),
         ("summary, summary_2", "", "figures of `record info` over all rows, for the first and the second device; missing if the recorder was killed"),
-        ("files", "", "CRC-32 of each other file, by name, in 8 hexadecimal digits. Until the recorder ends, only complete files are listed, and "
-         "`clock.npy` as it was when the manifest was written. The last member of the manifest, `crc32`, is the CRC-32 of the manifest "
-         "up to the comma before this member ([the log](log.md))")]),
+        ("files", "", "CRC-32 of each other file, by name, in 8 hexadecimal digits. While the recorder runs, the list has only files that are complete. "
+         "`clock.npy` is also listed; its CRC-32 is of the moment at which the manifest was written. The last member of the manifest, "
+         "`crc32`, is the CRC-32 of the manifest up to the comma before this member ([the log](log.md))")]),
     ("Summary of a log", "`./kerf record info LOG --report FILE`.",
      [("record/manifest.cpp", "void for_each_figure("), ("record/recording.cpp", "std::string to_json(")], [], [
         ("date", "", "date of the first tick, UTC; null if the log has no date"),
         ("rows, first_tick, last_tick, seconds", "", "number of rows; first and last tick; length in seconds"),
-        ("lost_ticks, missed_before_start, end_reason", "", "as in the report of the recorder; for a log that was cut, `end_reason` names the last row"),
+        ("lost_ticks, missed_before_start, end_reason", "", "as in the report of the recorder; if counted rows at the end of the log are missing, `end_reason` is `cut after N of M rows`"),
         ("contact_ticks, shaft_ticks, stale_ticks, faults", "", "as in the report of the controller; number of faults"),
         ("missed_deadlines, lost_packets, refused_packets", "", "counts at the end of the log"),
         ("peak_force_n, deepest_mm", "N, mm", "highest force; largest penetration"),
-        ("removed_density_mm3", "mm3", "removed density over full density, in all"),
+        ("removed_density_mm3", "mm3", "sum of the removed density; a voxel of full density counts as its volume"),
         ("port_energy_mj, port_minimum_mj", "mJ", "work at the device port; its lowest value. Each [source of energy](#sources-of-energy) also has a key: "
          "`spring_mj` ...")]),
     ("Visualizer", "`./kerf visualizer --report FILE`, and `visualizer.json` of a demo.",
@@ -169,7 +169,7 @@ REPORTS = [
         ("otsu_value, otsu_density", "", "Otsu's threshold as a value of the file; as a density, 0 to 1"),
         ("solid_box, solid_ratio", "voxels, 0 to 1", "smallest box that contains all voxels at or above this threshold, from `lo` to before `hi`; "
          "fraction of these voxels"),
-        ("noise_density, noise_share", "", "noise of the solid voxels, as a density; this noise over the step of density at the surface"),
+        ("noise_density, noise_share", "", "noise of the solid voxels as a density; its ratio to the step of density from air to the solid"),
         ("denoise_passes", "", "number of passes of `denoise = \"auto\"`"),
         ("histogram", "", "number of voxels in each of 64 equal steps of the window")])]
 
@@ -205,8 +205,8 @@ the keys. `python3 lab/report` makes the page or the plot again from such a file
 ## Sources of energy
 
 Each row is the part of the work at the device port that comes from one source. `spring` is the work that a spring without sampling would
-do. The servo holds the force of the spring for a tick, which costs damping of K T/2; `leak` is the work of this difference
-([forces](forces.md), 5.5).
+do. The servo holds the force of the spring constant for a tick (sample and hold), which acts like a damping of -K T/2. `leak` is the work of
+this effect ([forces](forces.md), 5.5).
 
 {table(("source", "part of the work"), [(f"`{word}`", what) for word, what in energies])}
 
@@ -214,5 +214,5 @@ do. The servo holds the force of the spring for a tick, which costs damping of K
 
 {table(("`--port`", "counters in `link`"), ports)}
 
-A port over a socket has no counters.
+[Devices](devices.md#counters-of-the-link) has the meaning of each counter. A port over a socket has no counters.
 """
