@@ -21,14 +21,19 @@ ABOUT = """\
 `./kerf bench kernels --page docs/performance.md` makes the tables up to *Pictures*. All figures come from one run; none is typed in.
 Machines are noisy: compare the ratios, which divide two figures of the same run.
 
-Each row is one tick of the servo's kernels on 256 x 256 x 161 voxels, at the costliest position of each kind. No result is kept
-from tick to tick.
+Each row is one tick of the servo's kernels on 256 x 256 x 161 voxels. No result is kept from tick to tick. `contact/cube16/any` is the name
+of a tick:
 
+* `contact`: contact force. The tool moves around a solid ball, 2 voxels deep. `mill`: contact force, and removal by overlap. The tool is
+  surrounded by material, which costs most. `preston`: removal by force.
+* `ball16` is a ball of 16 voxels diameter, `cube16` a cube of 16 voxels edge.
+* `aligned`: the tool is not rotated. `any`: its rotation changes from tick to tick. `cold`: before each tick 96 MB go through the caches.
+  `border`: a part of the tool is outside of the volume. `groove`: the tool moves in a groove of its own width. `inside`: in the solid.
 * `paper` is the paper's algorithm at -O2: an array of structures with the stored float gradient, and a dense 5x5x5 refresh of the voxels
   that a cut changed. The ratio of a row is the time of `paper` over the time of the row.
 * `reference` is plain fixed-point code with stored gradients.
-* `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits. Tools that are not rotated use the method
-  `aligned`. Tools in any pose (`any`) use `gather` for contact and `splat` for milling.
+* `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits. Balls, and tools that are not
+  rotated, use the method `aligned`. A cube in any pose (`cube16/any`) uses `gather` for contact and `splat` for milling.
 * Rows of an instruction set that the measuring machine does not have stay unchanged. A line names the machine that measured them.
 * `bytes` is the memory that the tick needs in addition to the two bytes of each voxel.
 
@@ -49,7 +54,7 @@ LAYOUT = """
 
 The servo stores its volume linearly, x fastest. The alternative is bricks of 8x8x8 voxels.
 
-* The rows `copy` compare copies of the tool's box from both layouts, with warm caches, and in `cold` after 96 MB went through the caches
+* The rows `copy` compare the time to copy the box around the tool from each layout. The caches are warm; in `cold`, 96 MB go through them
   before each tick. The ratio is the time of the linear copy over the time of the row.
 * The other rows compare one tool in volumes of three sizes. The ratio is the time in the smallest volume over the time of the row.
 

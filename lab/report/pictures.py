@@ -16,8 +16,8 @@ ABOUT = """\
 the paper are typed in. Machines are noisy: compare figures of the same run.
 
 The table shows the time of a frame: update of the renderer and drawing of the volumes, without tool and panel, with a fixed camera. The
-volume is a synthetic molar (`visualizer/bench/bench_tooth.cpp`). It fills about the same fraction of its grid as the paper's padded
-tooth, and it fills the picture.
+volume is a synthetic molar (`visualizer/bench/bench_tooth.cpp`), which fills the picture. The grid has air around the tooth (padding). The
+tooth fills about the same fraction of the grid as the tooth of the paper.
 
 * `cropped`: the grid has no air around the tooth; the picture is the same.
 * `static`: the whole picture is drawn.
@@ -47,7 +47,7 @@ Each gradient is stored in 8 bytes for each voxel and computed again around a cu
 * `adaptive` uses 15x15x15 voxels if their normal differs little from the normal of `farid5`. At an edge it differs, and `adaptive` uses
   `farid5`, which has 5x5x5 voxels. If the edges of a voxel differ, `adaptive` uses equal lengths along each axis, five of the longest edges to
   each side; the other gradients count voxels.
-* `corners` inverts the highest frequency of the voxels, so it draws hatching on smooth surfaces.
+* `corners` changes the sign of the highest spatial frequency that voxels can have, so smooth surfaces are drawn with hatching.
 * `central` draws rings.
 
 `surface`, `cast`, exported surfaces and the page shade by the same gradients. Their tests limit `adaptive` to 3 degrees for 99 of 100
