@@ -25,14 +25,15 @@ One setting is changed at a time. All others have their standard value, in bold 
 PROXY = """\
 ### The swept proxy
 
-This is the default contact (docs/theory.md 4), as the servo runs it. A hand goes straight down from a contact. The tool
-should stay at the contact, so the spring should be as long as the way of the hand and point back along it. Faces are ramps
-over two voxels, as a scanner has them.
+This is the default contact (docs/theory.md 4), as the servo runs it. From a position of contact a hand goes straight down,
+into the solid. The tool should stay at the position of contact. So the spring should be as long as the distance that the
+hand went, and point back along it. Faces are ramps over two voxels, as a scanner has them.
 
 * `depth`: distance of the tool's centre along the normal from its ideal position of rest, in voxels.
-* `force`: length of the spring over the way of the hand, as an error. `direction`: angle of the spring to the normal. Both
-  are taken only if the way is at least a tenth of the radius.
-* `step`: the change of the force over 0.00125 mm along the face (a hundredth of the standard voxel), over the force.
+* `force`: relative error of the spring's length against the distance that the hand went. `direction`: angle of the spring to
+  the normal. Both are measured only if this distance is at least a tenth of the radius.
+* `step`: the change of the force if the hand moves 0.00125 mm along the face (a hundredth of the standard voxel), relative
+  to the force.
 * `us p50`, `p99`: times of one tick that slides on the ball, without milling.
 
 """
@@ -40,13 +41,14 @@ over two voxels, as a scanner has them.
 NOTICED = """\
 What a hand can notice:
 
-* Two forces have different directions: from 18.4 degrees on if the picture shows the same directions, from 25.6 without a
+* A difference in the direction of two forces: from 18.4 degrees on if the picture shows the same directions, from 25.6 without a
   picture (Barbagli, Salisbury, Ho, Spence, Tan 2006, means of the three conditions in the abstract).
-* A force is larger: from 7 % on, at 2.5 to 10 N (Pang, Tan, Durlach 1991, abstract).
+* A difference in magnitude: from 7 % on, at 2.5 to 10 N (Pang, Tan, Durlach 1991, abstract).
 
-So the direction of the standard is {direction} times finer than a hand can notice, and its force {force} times, both at their worst. Voxels
-half as wide make a tick {fine_time} times as long, and the direction {fine_direction} instead of {standard_direction} degrees. Both are far below what a hand
-notices. Use them for a shape that is thinner than two voxels, not for the hand.
+So with the standard settings the largest error of the direction is {direction} times smaller than a hand can notice, and the
+largest error of the force {force} times. With voxels half as wide a tick takes {fine_time} times as long, and the largest error of
+the direction is {fine_direction} instead of {standard_direction} degrees. Both are far below what a hand notices. So use small voxels for a shape
+that is thinner than two voxels; a hand does not need them.
 
 """
 
@@ -72,10 +74,11 @@ REMOVAL = """\
 ### Removal
 
 This study does not measure removal; `tests/kernel/milling_test.cpp` has limits for it. One stamp of a ball with a radius of
-five voxels removes the ball's volume to 1 %. A straight sweep with a radius of ten voxels that stays on the lattice of the
-voxels removes its capsule to 1 %. Off the lattice no sweep is that exact. Many stamps in a row partly cover the voxels at its
-rim, and by the paper's overlap rule each stamp removes its fraction of what is left. A groove then has a radius that is up to
-about half a voxel larger than the tool's, at steps of a quarter of a voxel to a whole voxel.
+five voxels removes the ball's volume to 1 %. A straight sweep of a ball with a radius of ten voxels removes its capsule to 1
+%, if the ball's centre stays on the lattice of the voxels. Off the lattice no sweep is that exact. A sweep is a row of
+stamps, and each voxel at the rim is partly covered by many of them. By the paper's overlap rule each stamp removes the
+covered fraction of the density that is left. If the stamps are a quarter of a voxel to a whole voxel apart, the radius of
+the groove is up to about half a voxel larger than the tool's.
 """
 
 PERCENT, PERMILLE, PPM = 100, 1000, 1e6
@@ -120,13 +123,14 @@ TABLES = [
 ### Arithmetic
 
 `against double` is the difference to the force of the same program text in double, in millionths of full scale. `corner` is
-the error of one trilinear interpolation of random 16-bit corners, in steps of the corners. The servo has Q15 and double. Q8
-and Q12 are coarser weights in the same interpolation.""",
+the error of one trilinear interpolation between eight random 16-bit values, in units of their last bit. The servo has Q15
+and double. Q8 and Q12 are coarser weights in the same interpolation.""",
      [DOUBLE, DOUBLE_MAX, CORNER, CORNER_MAX, MEMORY]),
     ("pitch", """\
 ### Pitch of the tool's samples
 
-The pitch is in voxel edges. A sample represents the cube around it, so coarse samples do not have the ball's volume.""",
+The pitch is in voxel edges. A sample represents the cube around it. With a coarse pitch the cubes together do not have the
+volume of the ball.""",
      [SAMPLES, THEORY, THEORY_MAX, DIRECTION, TOOL_LOOP, STEP]),
     ("kernel", """\
 ### Gradient kernel
@@ -174,7 +178,8 @@ ADVICE = """\
   the tool makes or takes {central|TOOL_LOOP} of the absolute work instead of {farid|TOOL_LOOP}.
 * If a closed path must make no energy: a spline of the density. The loop of the tool makes or takes {spline 2|TOOL_LOOP}
   (quadratic) or {spline 3|TOOL_LOOP} (cubic) of the absolute work instead of {int16 gradients|TOOL_LOOP}.
-* Never the nearest voxel: 0.01 voxel can change the force by {nearest|STEP} thousandths of full scale, trilinear by {trilinear|STEP}.
+* Never the nearest voxel. With it, a motion of 0.01 voxel can change the force by {nearest|STEP} thousandths of full scale; with
+  trilinear interpolation, by {trilinear|STEP}.
 * Most of the error against the true force is blur, by the kernel and by the ramp of one voxel at each face. Voxels of
   0.0625 mm instead of 0.125 mm take {0.0625 mm|0.125 mm} times as long in the method `gather`, and have {0.0625 mm|THEORY} instead of {0.125 mm|THEORY} %.
 

@@ -40,8 +40,8 @@ PROMISES = """\
 The table has what kerf promises about contact, cutting, stability and robustness, with the test of each promise. `./kerf
 test` runs the tests in `tests/`. Where numbers matter they run in fixed point and in double, and most contact tests at 0.25,
 1 and 8 kHz. The words `walls`, `rests`, `slides`, `air`, `isos`, `cutting` and `traps` are groups of rows above (`--only`).
-*In these rows* means that the rows of the group have the limits. Tests cite the numbers F (force), N (numbers and gradients)
-and S (stability).
+*In these rows* means: see column *must* of the named group. Tests cite the promises by the letters F (force), N (numbers and
+gradients) and S (stability) with a number.
 
 | | promise | limit | test |
 |---|---|---|---|
@@ -56,14 +56,14 @@ and S (stability).
 | F12, F15 | without force or spindle nothing is cut; a cut depends only on the force of the same tick | exact | `tests/kernel/preston_test.cpp`, `tests/kernel/milling_test.cpp` |
 | F13 | the carry makes cuts below one density step exact | 1e-6 | `tests/kernel/milling_test.cpp` |
 | F14 | one stamp of a ball of R 5 or more removes the ball's volume | 1 % | `tests/kernel/milling_test.cpp` |
-| S1 to S6 | exact stability boundary of a sampled wall, with delay, filter, device and hand | last digit of tables, 0.2 % | `tests/stability/stable_gains_test.cpp` |
+| S1 to S6 | exact stability boundary of a sampled wall, with delay, filter, device and hand | the last digit of tabled values; 0.2 % for the plant of an Omni (S6) | `tests/stability/stable_gains_test.cpp` |
 | S7, S8 | damping at which a wall is passive, with filter and any delay | 1e-6 | `tests/stability/passive_limits_test.cpp` |
-| S9 to S13 | one simulated axis has the exact boundary, and with friction and encoder steps the boundaries of another simulator | 2 %; 10 % of 44 tabled values | `tests/stability/one_axis_test.cpp`, `tests/lab/zwidth_test.cpp` |
-| S14 | the energy observer is the integral of force times velocity | 1e-9 J; sources sum to the last bit | `tests/servo/energy_ledger_test.cpp` |
+| S9 to S13 | one simulated axis has the exact boundary; with friction and encoder steps it has the 44 boundaries that another simulator found | 2 %; 10 % | `tests/stability/one_axis_test.cpp`, `tests/lab/zwidth_test.cpp` |
+| S14 | the energy observer is the integral of force times velocity | 1e-9 J; the sum of the sources is exact to the last bit | `tests/servo/energy_ledger_test.cpp` |
 | S15 | with the passivity controller a wall of 20 N/mm is stable under a push of 1 N | within 2 mm, booked energy at least -1e-9 J | `tests/servo/stabiliser_test.cpp` |
 | S17, S18 | error of the velocity estimator with encoder steps of 0.055 mm | 0.6 and 0.4 mm/s rms at 10 and 200 mm/s | `tests/servo/velocity_window_test.cpp` |
 | | material softer than the iso gives no force | in these rows | `tests/kernel/contact_volumes_test.cpp`, `tests/proxy/iso_test.cpp`, `traps` |
-| | no drag in air outside of the range that `--check` prints | in these rows | `tests/proxy/air_test.cpp`, `tests/plan/bounds_test.cpp`, `air` |
+| | no drag in air up to the speed that `--check` prints | in these rows | `tests/proxy/air_test.cpp`, `tests/plan/bounds_test.cpp`, `air` |
 | | normals do not depend on the iso | in these rows | `tests/proxy/iso_test.cpp`, `isos` |
 | | no command, hold or new tool moves the proxy through a wall | force within 2 % | `tests/servo/kept_place_test.cpp`, `tests/proxy/place_anew_test.cpp` |
 | | a solid at the border of a volume is cut as if there were air outside | exact | `tests/volume/crop_resample_test.cpp`, `tests/servo/border_test.cpp` |
@@ -72,28 +72,28 @@ and S (stability).
 | | a tool in its bore removes nothing behind it | 0.5 % | `tests/servo/material_share_test.cpp` |
 | | a tool cuts what it rests on: rims, flanks, radii from 1 to 7.5 voxels | no stop | `tests/servo/rim_cut_test.cpp`, `tests/tool/tool_mesh_test.cpp` |
 | | a pressing tool keeps cutting | no random press stops (open cases below) | `tests/studies/extremes_test.cpp`, `tests/proxy/shaft_test.cpp`, `tests/proxy/spent_work_test.cpp`, `traps` |
-| | filters, resets and refused starts behave in the same way at all rates | 20 ms | `tests/servo/output_and_reset_test.cpp` |
+| | filters, resets and refused starts behave in the same way at all rates | the filter of the gimbal: 20 ms | `tests/servo/output_and_reset_test.cpp` |
 | | the check of the safety contract detects each breach that is planted | all | `.ci/mutate.py safety`, `tests/lab/contract_test.cpp`, `tests/lab/fault_run_test.cpp` |
-| | Omni, Falcon and WoodenHaptics arm in the same time from 250 to 8000 Hz; a wait is reported | within 16 ms; after 1 s | `tests/lab/arming_test.cpp`, `tests/shell/run_test.cpp` |
+| | Omni, Falcon and WoodenHaptics switch the force on after the same time at all rates from 250 to 8000 Hz; a start that must wait is reported | within 16 ms; after 1 s | `tests/lab/arming_test.cpp`, `tests/shell/run_test.cpp` |
 | | every signal that ends a program switches the motors off first | all signals | `tests/shell/motor_guard_test.cpp`, `tests/programs/signals_test.cpp`, `tests/programs/kills_test.cpp` |
 | | a broken file gives one line, never a crash or a large allocation | fuzzed | `tests/volume/sandbox_test.cpp`, `tests/volume/read_test.cpp`, `.ci/fuzz.sh` |
-| | no output follows a planted link, and no file is replaced by a part of its new text | all | `tests/posix/new_file_test.cpp` |
+| | no output is written through a planted link, and no file is replaced by an incomplete one | all | `tests/posix/new_file_test.cpp` |
 | | with few descriptors, a small stack or a full disk a program gives one line and exit code 2 | all | `tests/programs/limits_test.cpp` |
 | | programs that do not match (device, rate, lock-step) end with the same line on both sides | all | `tests/programs/partners_test.cpp`, `tests/hil/sockets_test.cpp` |
-| | the window never writes outside of its heap blocks, and a kept picture equals a new one | random user | `tests/visualizer/app/window_test.cpp`, `kerf-visualizer-monkey` |
+| | the window never writes outside of its heap blocks, and a picture that is kept from an earlier frame equals a newly drawn one | random user | `tests/visualizer/app/window_test.cpp`, `kerf-visualizer-monkey` |
 
 ### Where a promise is narrower than its words
 
 * F7: rotating tools penetrate deeper than a ball (`walls`).
 * F14: a sweep whose stamps lie between voxels removes up to 23 % more than the capsule. Its groove is at most 0.55 voxels
   wider than the tool in radius.
-* S15: between two readings the port itself may give 4.0 mJ, which no account contains.
+* S15: between two readings of the encoders the port itself may give 4.0 mJ. No account contains this energy.
 * Open: of 10,000 random presses from `--seed 0` two stop cutting (scene 478, press 16; scene 483, press 0). In both the tool
-  has a shaft, and the planes that the servo keeps do not carry the force of the hand. In 478 the only plane is the shaft's.
-  Of 0.76 N it leaves 0.11 N to a head that touches nothing. In 483 one plane of the shaft and one of the head leave 0.56 of
-  0.78 N. The cut counts the 0.56 N as normal force of the head, where no material is left. The likely cause: a part of a
-  shaft that touches two faces has only one plane. `tests/studies/contact/stuck_rows.cpp` lists both presses, so `traps` shows
-  them and fails for any other.
+  has a shaft, and the constraint planes of the servo do not carry the force of the hand. In scene 478 the only plane is at
+  the shaft. It leaves 0.11 N of 0.76 N for the head, but the head touches nothing. In scene 483 one plane at the shaft and
+  one at the head leave 0.56 N of 0.78 N. The cut takes these 0.56 N as the normal force of the head, but at the head no
+  material is left. The likely cause: if a part of a shaft touches two faces, it has only one plane for both.
+  `tests/studies/contact/stuck_rows.cpp` lists both presses, so `traps` shows them and fails for any other.
 """
 
 COMPARED = """\
@@ -107,8 +107,8 @@ resistance along %s mm of its way in the thick wall, and along %s mm at the thin
 wall, and its force grows with the depth of the hand.
 
 The paper's force acts only in a zone near a face. A hand that moves across this zone in one tick can pass the face without
-any force. The table has the lowest speed at which this happens for at least one phase of the ticks. The proxy is measured
-up to 10 m/s, because the supervisor stops a faster hand.
+any force, if the ticks fall just before and behind the zone. The table has the lowest speed at which this can happen. The
+proxy is measured up to 10 m/s, because the supervisor stops a faster hand.
 
 | update rate | paper, %s | paper, %s | proxy, both |
 |---:|---:|---:|---:|
@@ -122,50 +122,56 @@ Both forces are smooth while the tool slides over a ball. At 50 mm/s the force c
 GROUPS = [
     ("walls", "Walls", """\
 A hand makes random steps of 0.1 to 10 m/s at a tilted wall, without a supervisor. The cylinder and the bur of
-`scenes/fluted_bur.toml` are also rotated at random. *Sunk* is the depth of the tool in the wall. The tool may stay 0.05
-voxels deep if a tick has no query left to push it out (`kWedged` of the sweep). From this a mesh subtracts the length by
-which it reaches beyond its samples, 0.03 voxels for the bur (docs/theory.md 4.2)."""),
+`scenes/fluted_bur.toml` are also rotated at random. *Behind*: a tool at the hand's position would be in the wall or behind
+it. *Sunk* is the depth of the tool in the wall. The tool may stay up to 0.05 voxels deep (`kWedged` of the sweep) if it is
+wedged between two walls, or if a tick has no query left to push it out. For a tool from a mesh this limit is lower, by the
+length that the mesh reaches beyond its samples: 0.03 voxels for the bur (docs/theory.md 4.2)."""),
     ("air", "In air", """\
-A tool moves to and fro along tilted walls. It is so close and so fast that the hand moves 2.4 to 80 voxels in a tick.
-`--check` prints the speed up to which a scene has no drag, at any distance from a wall (docs/theory.md 4.2).
+A tool moves to and fro along tilted walls, 0.03 to 0.5 mm beside them, and so fast that the hand moves 2.4 to 80 voxels in a
+tick. `--check` prints the speed up to which a scene has no drag, at any distance from a wall (docs/theory.md 4.2).
 
-The force follows from the spring at 0.4 N/mm and from the velocity of the hand. It is the larger of the forces without
-damping and with 1 N s/mm, the lowest and the highest damping of a scene. So a spring of a thousandth of a voxel that
-remained in air would give several newtons."""),
+The force follows from the spring at 0.4 N/mm and from the velocity of the hand. It is the larger of two forces: without
+damping, and with 1 N s/mm. These are the lowest and the highest damping of a scene. The test is sharp: if a spring of only a
+thousandth of a voxel remained in air, the damper would already give several newtons."""),
     ("rests", "Where a ball comes to rest", """\
 The offset is the distance of the tool from its ideal position of rest, at random tilts. *Convex 40* is a solid ball of
 R 40, *concave 40* a hollow. On edges the offset is relative to the volume's own iso-surface, because trilinear density has
 no sharp edge."""),
     ("slides", "Slides", """\
-The force step is the change of the force from tick to tick over its mean. The rotation of the normal alone makes 1.04 % at
-R 40 and 4.5 % at R 14. At R 14 the limit is 0.08 N, which is twice the mean. `CT` has edges blurred by a deviation of one
-voxel, and noise of 2 %."""),
+The force step is the largest change of the force from one tick to the next, divided by the mean force. The rotation of the
+normal alone makes 1.04 % at R 40 and 4.5 % at R 14. The limit of 200 % at R 14 is a limit of 0.08 N. *Surface sd* is the
+standard deviation of the height of the tool on the surface. `CT` has edges blurred by a deviation of one voxel, and noise of
+2 %."""),
     ("shapes", "Tools that are no balls", """\
 The tools rest on flats of any tilt and on sharp edges of 90 degrees. On edges the offset is relative to the volume's own
 iso-surface. The tools also slide at 50 mm/s over a ball of R 40, 2 voxels deep. The limits are 1.5 times those of the ball.
 
-On CT with noise a rim or a point touches at one position, where the noise of one voxel makes waves of the surface itself.
-The height and normal of a ball are means of some fifty samples. So a scene smooths such a volume when it loads it
-(`denoise = "auto"`, docs/theory.md 2.4). The rows with limits have this smoothing, the rows with `denoise off` do not.
+A rim or a point touches at one position only. On CT with noise, the noise of single voxels makes the surface wavy at this
+position. (The height and the normal of a ball are means of some fifty samples.) So when a scene loads such a volume, it
+smooths the volume (`denoise = "auto"`, docs/theory.md 2.4). The rows with limits have this smoothing, the rows with `denoise
+off` do not.
 
-`exact contact` shows the surface that was not smoothed. Its height is that of the iso-surface where the tool's close samples
-touch it at the ideal position. Its normal is a mean over half a voxel. A contact that averages over no samples would have
-these errors."""),
+The rows `exact contact` are for comparison, on the surface without smoothing. They show the errors of a contact that takes
+no mean over samples. The height is the height at which the first close sample of the tool touches the iso-surface. The
+normal follows from such heights half a voxel to each side."""),
     ("edges", "Along and over sharp edges", """\
-The tool is a ball, or a cylinder whose side lies on the edge. It moves along and over a sharp convex edge of 90 degrees,
-two voxels deep, at 0.05 voxels a tick. The density of a voxel is the fraction of solid in a cube of two voxels, as in a
-scan. A ramp of the distance from the solid would have a ridge that voxels cannot represent. Its trilinear iso-surface would
-be a row of bumps about a voxel apart, and the position nearest to the hand would jump from bump to bump."""),
+The tool is a ball, or a cylinder whose side lies on the edge. The hand leads it along and over a sharp convex edge of 90
+degrees, two voxels below the position of rest, at 0.05 voxels a tick. The density of a voxel is the fraction of solid in a
+cube of two voxels, as in a scan. It is not a ramp of the distance from the solid, because such a density has a ridge that
+voxels cannot represent: its trilinear iso-surface is a row of bumps about a voxel apart, and the position nearest to the
+hand jumps from bump to bump."""),
     ("isos", "Low and high iso", """\
 Tools rest on flats of any tilt and on balls of R 14. The iso is not half of full density. The limit of the angle between
 force and normal is 1.5 times the angle at an iso of 0.45."""),
     ("cutting", "Cutting by force", """\
-The whole servo runs with `[cut] model = "preston"` and a ball of radius 1 mm, in three motions:
+The whole servo runs with `[cut] model = "preston"` and a ball of radius 1 mm. G is the removal rate per newton, F the normal
+force. The hand makes three motions:
 
-* a hand moves the ball over a flat (rows *removed against the integral of G F*);
+* it moves the ball over a flat (rows *removed against the integral of G F*);
 * it presses on the flat with a force that rises to 1.2 N and falls again, however far the flat is cut away (rows *removed by
   the same force*);
-* it lowers the ball into a crown at the rate of enamel, at nine positions, of which the worst counts (rows *milling into*).
+* it lowers the ball by 2.5 mm into a crown, which is cut at the rate of enamel. The worst of nine positions counts (rows
+  *milling into*).
 
 `GE tooth` is a CT of a real tooth, in the folder of `--data` or `$KERF_DATA`."""),
     ("traps", "Traps", """\
@@ -175,25 +181,28 @@ the force is above the threshold, volume must be removed.
 * Tools: the shapes with a radius of 0.4 to 1 mm, and the fluted bur. Half of them have a shaft, some a handpiece. Wrist,
   start and direction are random.
 * Solids: a flat, a crown, layers, rubble, pits, shells, plates, or a block that ends at the volume's border, rotated at
-  random. About half of them contain soft material, which in half of these may not be cut. Machinability is 1, 4 or 8 times
-  that of enamel.
+  random. Three of eight scenes contain soft material; in half of these scenes the soft material may not be cut.
+  Machinability is 1, 4 or 8 times that of enamel.
 * Three of four scenes run in fixed point at 1 kHz or 250 Hz, the others at 8 kHz or in double.
-* A shaft may carry the load that forces along the normals of its touching cylinders can balance. The head carries the rest.
+* A press on shaft and head need not cut if the shaft alone can carry it, by forces along the normals at which its cylinders
+  touch. What the shaft cannot carry so is the load of the head, and must cut.
 * A solid that is softer than the iso everywhere must carry no load.
 
 A run has 240 presses, or 10,000 with `--only traps`. `--seed` is the number of the first scene."""),
     ("ticks", "Ticks", """\
 The volumes have 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow
 and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, if its data are present, at the GE
-tooth. The goals are near and far, and some ticks begin with the search for a start position. The costliest ticks are
-repeated from the same state, and the fastest repetition counts. The row names the solid at which the tick was found.
+tooth. The hand's positions are near the tool and far from it, and some ticks begin with the search for a start position. The
+costliest ticks are repeated from the same state, and the fastest repetition counts. The row names the solid at which the
+tick was found.
 
-Times are of the machine named above. The limits are for a processor with AVX-512. On a slower processor the paper's tick in
-this table is slower too."""),
+Times are of the machine named above. The limits are for a processor with AVX-512. For a slower processor, compare with the
+paper's tick in this table."""),
     ("hands", "Hands", """\
 An emulated Omni, its driver and the whole servo run in virtual time with `scenes/touch.toml`. The hands `groove` and
-`cut_cavity` have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.128 s that are wholly in
-contact. One count of an encoder is up to 0.06 mm, or 0.024 N. The second stab of `jerk` misses the crown."""),
+`cut_cavity` have `[cut] model = "preston"`. *Force above 150 Hz* is the rms of this part of the force, over windows of 0.128
+s. A window counts if the tool is in contact during all of it. One count of an encoder is up to 0.06 mm, or 0.024 N. The
+second stab of `jerk` misses the crown."""),
 ]
 
 

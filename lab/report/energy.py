@@ -37,18 +37,19 @@ A hand pushes with 1 N from 0.1 mm above a wall, and after 2 s it pulls back. Fi
 
 * `hand`: `bare` is the device alone, 0.045 kg and 0.2 N s/m; `gripped` is the device in a hand, 0.145 kg and 3.2 N s/m. The
   stabilisers know the figures of the device only.
-* `delay`: from first contact to half of the push (3000: never).
+* `delay`: time from first contact until the force is half of the push (3000: never).
 * `depth`, `travel`: mean penetration and its peak-to-peak value in the last half second of the push.
 * `drag`: largest force in air after the hand pulled back.
-* `minimum`: lowest energy of the port. The correction of `passivity` comes one tick late. If a hand damps the device
-  anyway, a stiff wall may have a lower minimum with `passivity` than without a stabiliser.
+* `minimum`: lowest energy of the port. The correction of `passivity` comes one tick late. So with a stiff wall the minimum
+  may be lower with `passivity` than without a stabiliser, if the hand itself already damps the device.
 
 """
 
 COST = """
 ### The time they take
 
-Time added to a tick in contact. The aim for ledger, observer and split of the spring together is 1000 ns.
+Time added to a tick in contact. *Ledger and observer* includes the split of the spring's work into stored energy and leak.
+The aim for all of it is 1000 ns.
 
 """
 

@@ -43,22 +43,24 @@ cell: the tip starts at a distance from the wall, with a speed, and a constant f
 stiffness gets five presses for each seed:
 
 * three standard presses: 0.5 N from 0.1 mm, at 0, 50 and 200 mm/s;
-* two presses of a sequence. Over all stiffnesses the sequence covers evenly the pushes from 0.05 N to 0.9 of the peak
-  force, speeds up to 500 mm/s and distances up to 2 mm.
+* two presses of a low-discrepancy sequence. Over all stiffnesses it covers three ranges evenly: pushes from 0.05 N to 0.9 of
+  the peak force, speeds up to 500 mm/s, and distances up to 2 mm.
 
 A cell has the worst verdict of its presses. `--push`, `--hit` and `--start` fix the push, the speed and the distance. A
 list of values makes one of them an axis of the map.
 
-The verdicts (all except the first are columns of `--csv`):
+The verdicts follow. All except the first are columns of `--csv`. In them E1 is the work of the push over one encoder step. A
+loop without encoder steps has 0.0001 mm in place of the step.
 
-* *settles*: this is proven for each press, in one of two ways. Either friction holds the tip, under a constant force, for
-  longer than the loop remembers earlier motion. Or, in the last half of the run, the travel is at most one encoder step
-  and the motors give at most the energy of the push over one step. Without encoder steps 0.0001 mm replaces the step.
-* *swings* (oscillates): the last half of a run has eight windows. In the first four, and again in the last four, the tip
-  reverses at least twice, each time after more than one encoder step. If the travel falls from every window to the next,
-  the motion dies out and is no oscillation. A creeping tip does not reverse, so it does not count as oscillating.
-* *active*: in the first four windows, and again in the last four, the motors give more energy than a push over one encoder
-  step takes. A run is not active if the travel, or this energy, falls from every window to the next.
+* *settles*: this is proven for each press, in one of two ways. Either friction holds the tip under a constant force, for so
+  long that no earlier motion can still act through the delay or the velocity window. Or, in the last half of the run, the
+  tip travels at most one encoder step and the motors give at most E1.
+* *swings* (oscillates): the last half of a run is divided into eight windows. In the first four windows together, and again
+  in the last four, the tip reverses at least twice, each time by more than one encoder step. If the travel falls from every
+  window to the next, the motion dies out and is no oscillation. A creeping tip does not reverse, so it does not count as
+  oscillating.
+* *active*: in the first four windows together, and again in the last four, the motors give more than E1. A run is not active
+  if the travel, or the energy of a window, falls from every window to the next.
 * *arithmetic*: only the rounding of fixed-point numbers keeps the tip in motion. The loop has no encoder steps, the travel
   is below 1 µm, and the same presses settle in double. The cell counts as stable.
 * *undecided*: neither settling nor oscillation is proven.
@@ -68,19 +70,21 @@ How a map is searched:
 * A run ends when the tip is proven to have settled, at the latest after 60 s. The limit is longer if mass and damping make
   the motion slower. With friction and encoder steps an oscillation is chaotic: one run in a hundred stops only after 3 to
   45 s. `--seconds` makes the limit longer, never shorter.
-* *First* is the lowest K of a column at which a run of any seed oscillates or is active. The search goes upwards in steps
-  of 1 % to the first bad press. Then it goes down by 2 %, again and again, as long as this press or a similar one is bad
-  there. The last step is halved to 0.5 %. For the whole arm the search goes upwards in the steps of the map, and halves the
-  last one to 0.5 %. Cells above *first* also get the bad press.
+* *First* is the lowest K of a column at which a run of any seed oscillates or is active; such a press is called bad. The
+  search goes upwards in steps of 1 % to the first bad press. From there it goes down in steps of 2 %, as long as this press
+  is still bad, or a press with a push, speed or distance close to it. Then the last step is halved until it is 0.5 %. For
+  the whole arm the search goes upwards in the steps of the map, and only halves the last one until it is 0.5 %. Each cell
+  above *first* is also run with the press that was bad at *first*.
 * A picture has a bar from the lowest to the highest *first* of the seeds. Stable cells above *first* are reported
   separately, as re-entry.
-* With friction the worst push is about half of the peak force. The oscillation then has the most room between no force
-  and the peak, and friction takes the smallest part of the energy of a large oscillation (docs/forces.md 5.7).
-* A map has no thermal limit, because the weaker force of hot motors would end an oscillation.
+* With friction the worst push is about half of the peak force. Then the force can oscillate with the largest amplitude
+  between 0 and its peak, and friction takes the smallest fraction of the energy of this oscillation (docs/forces.md 5.7).
+* Maps are made without the thermal limit of the motors. This limit lowers the force of hot motors, and so would end an
+  oscillation.
 
-A seed sets the phase of the encoder steps relative to the wall, which changes K by up to a factor of two for one press. It
-also sets the start of the sequence of presses. All columns use the same seeds, so two columns differ by their axes alone.
-`--seed` is the first seed, and `--seeds` the number of seeds, 5 by default.
+A seed sets two things: the phase of the encoder steps relative to the wall, and the start of the sequence of presses. The
+phase alone changes the first K of one press by up to a factor of two. All columns use the same seeds, so two columns differ
+by their axes alone. `--seed` is the first seed, and `--seeds` the number of seeds, 5 by default.
 
 *One axis*, the default, runs the servo's own coupling, velocity estimator, stabilisers and force limits: the same
 templates, in the number type of the loop, with exact mechanics of the device. *Whole arm* (`--arm`) runs the servo step
@@ -98,12 +102,14 @@ with the highest K on the device's map.
 
 * *Linear, exact* is the boundary of another loop: a linear two-sided wall with the backward difference as velocity, in
   double, without friction, encoder steps and limits. It is a solid line in a picture of that loop, and dotted in all others.
-* The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
+* The firm hand has 0.1 kg, 0.005 N s/mm and 0.5 N/mm. In the column *whole arm* a spring of 0.2 N/mm pushes the tip, not a
+  constant force.
 * Each measured K is the lowest of five seeds. Undecided counts as unstable. The map of the whole arm has 14 stiffnesses.
-* *Safe K, emulated* is the lowest K of the row divided by 1.5, for the emulated device alone. The margin covers phases, and
-  unstable islands between two steps, that no run of the map met. A test gives each of these 18 stiffnesses 10,000 random
-  presses (`zwidth_maps`, in the part `ranges` of `.ci/all`). No press of the 180,000 oscillates or is active. A few are
-  undecided: their push plus twice the friction is about the peak force, so the wall hardly moves the tip out.
+* *Safe K, emulated* is the lowest K of the row divided by 1.5, for the emulated device alone. The margin is for cases that
+  no run of the map met: other phases of the encoder steps, and unstable islands between two steps of the search. A test
+  gives each of these 18 stiffnesses 10,000 random presses (`zwidth_maps`, in the part `ranges` of `.ci/all`). No press of
+  the 180,000 oscillates or is active. A few are undecided. In these the push plus twice the friction is about the peak
+  force, so the wall can hardly push the tip back.
 * **Safe K, real unit**, in bold, is **the one to use with a real device that nobody has measured**. It is the highest
   stiffness that `./kerf controller --check` accepts without a warning at 1 kHz, for the device and B of the row. It assumes
   a viscous damping of 0.0002 N s/mm, less than the emulator has, and a delay of 2 ms in each row. It never exceeds the
@@ -117,21 +123,22 @@ with the highest K on the device's map.
 STABILISERS = """
 ## Stabilisers
 
-The table has the lowest unstable K with B = 0.002 N s/mm, as one axis / whole arm, of one seed. The stabiliser has the
-mass and damping of the device. If all pushes are light (`--push 0.5`), a stabiliser helps far more than in this table,
-which includes hard pushes. [Energy](#the-effect-of-a-stabiliser-on-the-hand) has the effect on the hand.
+The table has the lowest unstable K with B = 0.002 N s/mm, of one seed. Each cell has two values: one axis / whole arm. Each
+stabiliser is set to the mass and the damping of the device. The table includes hard pushes. If all pushes are light (`--push
+0.5`), a stabiliser helps far more. [Energy](#the-effect-of-a-stabiliser-on-the-hand) has the effect on the hand.
 
-`passivity` books a force in the tick that commands it. With a delay the force acts later, so the port may give far more
-energy than the account shows. The column `port_minimum_mj` of `--csv` has the lowest energy of the port in each cell. A
-cell gets no further runs once it oscillates and is active, so this column does not include them.
+The energy account of `passivity` counts a force in the tick that commands it. With a delay the force acts later, so the port
+may give far more energy than the account shows. The column `port_minimum_mj` of `--csv` has the lowest energy of the port
+over the runs of a cell. Once a cell oscillates and is active, its other runs are left out, and the column does not include
+them.
 
 """
 
 RATES = """\
-In the linear theory, without friction, the boundary grows in proportion to the rate. The measured boundary grows less.
-The encoder steps are the same at every rate. From 1 kHz on the velocity window spans up to 16 ms, so at a high rate its
-lag is more periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns the damping is
-unstable without any wall.
+In the linear theory, without friction, the boundary grows in proportion to the rate. The measured boundary grows less, for
+two reasons. The encoder steps are the same at every rate. And at rates from 1 kHz the velocity window spans up to 16 ms: at
+a high rate this lag is more periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns
+the damping is unstable without any wall.
 
 """
 
@@ -145,9 +152,9 @@ lowest stable K above the first crossing. Five seeds, 40 stiffnesses from 0.05 t
 """
 
 NUMBERS = """
-The two number types differ if a run is chaotic. Near every boundary of a loop with friction and encoder steps the runs are
-chaotic. A difference of 2^-16 mm or N moves an encoder step to another tick, so the tip settles at another position.
-Neither number type is better in general.
+The two number types differ if a run is chaotic, as most runs near a boundary are in a loop with friction and encoder steps.
+A difference of 2^-16 mm or N moves an encoder step to another tick, so the tip settles at another position. Neither number
+type is better in general.
 
 """
 
@@ -178,11 +185,11 @@ rows: it cannot exist, or the hand never met the wall.
 | impossible | reason that the column cannot exist, else null; if the hand never met the wall, it is null and `cells` is empty |
 | by_travel, by_energy | first crossings by *swings* and by *active*, each with the keys of the next four rows |
 | first_n_per_mm, reason | lowest K of all seeds; or null, and the reason: `below all`, `above all`, `undecided` (no cell is bad, one is undecided), `not measured` |
-| last_n_per_mm, last_reason | the *first* of the seed that crosses last, or null and the reason |
+| last_n_per_mm, last_reason | the highest *first* of all seeds, or null and the reason |
 | by_seed_n_per_mm, band_n_per_mm | lowest K of each seed, and its quantiles of 5 and 95 % over the seeds (use `--seeds 200`); null: no crossing, or below all |
 | re_entry_from_n_per_mm, re_entry_to_n_per_mm | range of K above the first crossing in which cells settle again; null: none |
 | undecided_from_n_per_mm | lowest K at which a run is undecided; null: none |
-| analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop; 0: no K is stable; null: there is no such bound. exact_holds, passive_holds: whether the bound is for the loop of this column |
+| analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop; 0: no K is stable; null: there is no such bound. exact_holds, passive_holds: whether the bound applies to the loop of this column |
 | cells | for each stiffness: swings, active, undecided, arithmetic, travel_mm, given_mj, port_minimum_mj |
 
 """
@@ -192,11 +199,11 @@ QUESTION = """\
 
 Which K may a device render, for any push, in its worst direction? What does a hand feel at 30 Hz?
 
-A map can take the device from a file. [`./kerf identify`](gains.md#identify-your-device) writes such a file for your
-device. `examples/devices/premium15.toml` is a Phantom Premium 1.5 with published figures. Its mass is a matrix: in
-the heaviest direction it is 2.6 times as large as in the lightest. The map is of one direction, by default `worst`: by
-theory (docs/forces.md 5.7) a push makes the device oscillate at a lower stiffness there than in any other direction.
-`--direction 1,0,0.5` sets another one.
+A map can take the device from a file. [`./kerf identify`](gains.md#identify-your-device) writes such a file for your device.
+`examples/devices/premium15.toml` is a Phantom Premium 1.5 with published figures. Its mass is a matrix: in the heaviest
+direction it is 2.6 times as large as in the lightest. A map is made for one direction, by default `worst`. By theory
+(docs/forces.md 5.7) a push in this direction makes the device oscillate at the lowest stiffness. `--direction 1,0,0.5` sets
+another one.
 
 """
 
@@ -209,11 +216,11 @@ measures the same wall at several frequencies:
 FELT = """
 At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is stiffer and less damped than the wall of the
 theory (docs/forces.md 5.8), because `foaw` lags behind the backward difference of the theory. At the device's port the hand
-feels {port_k} N/mm and {port_b} N s/mm, because the inertia of the device counts as a negative stiffness. Where the damping
-is negative, the hand gets energy, unless its own damping takes more.
+feels {port_k} N/mm and {port_b} N s/mm, because the inertia of the device counts as a negative stiffness. At frequencies
+with negative damping the hand gets energy, unless its own damping takes more.
 
-`--estimator difference` gives the wall of the theory. `--arm` measures the whole servo step with an emulated device.
-`--log DIR` measures the wall in a recording ([log](log.md)): in such a recording a hand moves to and fro in the wall, faster
+`--estimator difference` gives the wall of the theory. `--arm` measures the whole servo step with an emulated device. `--log
+DIR` measures the wall from a recording ([log](log.md)). For such a recording move your hand to and fro in the wall, faster
 and faster, like a chirp. `--plot` draws the figures.
 
 """
@@ -464,7 +471,7 @@ def page(data, devices, rates):
                            first(row["active"]), text.figure(row["exact"]),
                            text.figure(row["re_entry"]) if row["re_entry"] > 0 else "-"] for row in data["knobs"]])
             + "\n## Fixed point and double\n\n"
-            + "".join(f"* {row['numeric']}: {row['others']} of {row['cells']} cells oscillate in one number type and not in the other. "
+            + "".join(f"* {row['numeric']} point and double: {row['others']} of {row['cells']} cells oscillate in only one of the two. "
                       f"The first crossing\n  differs in {row['columns']} columns, by a factor of at most {row['factor']:.3g}.\n"
                       for row in data["numbers"])
             + NUMBERS + question(data["question"]) + HOW + FILES + data["provenance"] + "\n")
