@@ -41,14 +41,14 @@ hand went, and point back along it. Faces are ramps over two voxels, as a scanne
 NOTICED = """\
 What a hand can notice:
 
-* A difference in the direction of two forces: from 18.4 degrees on if the picture shows the same directions, from 25.6 without a
-  picture (Barbagli, Salisbury, Ho, Spence, Tan 2006, means of the three conditions in the abstract).
+* A difference in the direction of two forces: from 18.4 degrees on if the picture shows the same directions, from 25.6
+  without a picture (Barbagli, Salisbury, Ho, Spence, Tan 2006, means of two of the three conditions in the abstract).
 * A difference in magnitude: from 7 % on, at 2.5 to 10 N (Pang, Tan, Durlach 1991, abstract).
 
 So with the standard settings the largest error of the direction is {direction} times smaller than a hand can notice, and the
-largest error of the force {force} times. With voxels half as wide a tick takes {fine_time} times as long, and the largest error of
-the direction is {fine_direction} instead of {standard_direction} degrees. Both are far below what a hand notices. So use small voxels for a shape
-that is thinner than two voxels; a hand does not need them.
+largest error of the force is {force} times smaller. With voxels half as wide a tick takes {fine_time} times as long, and the largest
+error of the direction is {fine_direction} instead of {standard_direction} degrees. Both angles are far below what a hand notices. So use small voxels
+for a shape that is thinner than two voxels; a hand does not need them.
 
 """
 
