@@ -57,11 +57,12 @@ gradients) and S (stability) with a number.
 | F13 | the carry makes cuts below one density step exact | 1e-6 | `tests/kernel/milling_test.cpp` |
 | F14 | one stamp of a ball of R 5 or more removes the ball's volume | 1 % | `tests/kernel/milling_test.cpp` |
 | S1 to S6 | exact stability boundary of a sampled wall, with delay, filter, device and hand | the last digit of tabled values; 0.2 % for the plant of an Omni (S6) | `tests/stability/stable_gains_test.cpp` |
-| S7, S8 | damping at which a wall is passive, with filter and any delay | 1e-6 | `tests/stability/passive_limits_test.cpp` |
+| S7, S8 | damping at which a wall is passive, with filter and any delay | 1e-6 N s/m, with a filter 1e-5 N s/m | `tests/stability/passive_limits_test.cpp` |
 | S9 to S13 | one simulated axis has the exact boundary; with friction and encoder steps it has the 44 boundaries that another simulator found | 2 %; 10 % | `tests/stability/one_axis_test.cpp`, `tests/lab/zwidth_test.cpp` |
 | S14 | the energy observer is the integral of force times velocity | 1e-9 J; the sum of the sources is exact to the last bit | `tests/servo/energy_ledger_test.cpp` |
 | S15 | with the passivity controller a wall of 20 N/mm is stable under a push of 1 N | within 2 mm, booked energy at least -1e-9 J | `tests/servo/stabiliser_test.cpp` |
-| S17, S18 | error of the velocity estimator with encoder steps of 0.055 mm | 0.6 and 0.4 mm/s rms at 10 and 200 mm/s | `tests/servo/velocity_window_test.cpp` |
+| S17 | the difference of two encoder readings gives velocities only in multiples of D/T (D: encoder step, T: tick) | 1e-6 of D/T | `tests/stability/one_axis_test.cpp` |
+| S18 | error of the velocity estimator with encoder steps of 0.055 mm | 0.6 and 0.4 mm/s rms at 10 and 200 mm/s | `tests/servo/velocity_window_test.cpp` |
 | | material softer than the iso gives no force | in these rows | `tests/kernel/contact_volumes_test.cpp`, `tests/proxy/iso_test.cpp`, `traps` |
 | | no drag in air up to the speed that `--check` prints | in these rows | `tests/proxy/air_test.cpp`, `tests/plan/bounds_test.cpp`, `air` |
 | | normals do not depend on the iso | in these rows | `tests/proxy/iso_test.cpp`, `isos` |
@@ -87,7 +88,8 @@ gradients) and S (stability) with a number.
 * F7: rotating tools penetrate deeper than a ball (`walls`).
 * F14: a sweep whose stamps lie between voxels removes up to 23 % more than the capsule. Its groove is at most 0.55 voxels
   wider than the tool in radius.
-* S15: between two readings of the encoders the port itself may give 4.0 mJ. No account contains this energy.
+* S15: between two readings of the encoders the port itself may give 4.0 mJ (the test allows 10 mJ). No account contains this
+  energy.
 * Open: of 10,000 random presses from `--seed 0` two stop cutting (scene 478, press 16; scene 483, press 0). In both the tool
   has a shaft, and the constraint planes of the servo do not carry the force of the hand. In scene 478 the only plane is at
   the shaft. It leaves 0.11 N of 0.76 N for the head, but the head touches nothing. In scene 483 one plane at the shaft and
