@@ -68,16 +68,17 @@ last row dates all ticks:
     utc_ns = log["start_ns"].astype("i8") + (clock["utc_ns"] - clock["monotonic_ns"])[-1]
     print(utc_ns.view("datetime64[ns]")[0])
 
-`info` prints the date of the first tick, and one line if UTC was set during the run. Ticks before that moment have the date that a clock
-set already would have shown, so dates never go back. In lock-step time is virtual: tick 0 has the date at which the recorder began, and
-each further tick is later by the length of a tick. Logs of earlier versions have no date.
+`info` prints the date of the first tick, and one line if UTC was set during the run. Earlier ticks are dated as if UTC had been right
+from the start. So dates never go back. In lock-step time is virtual: tick 0 has the date at which the recorder began, and each further
+tick is later by the length of a tick. Logs of earlier versions have no date.
 
 ## Whether it is whole
 
-`./kerf record check DIR/log` compares all facts that the files contain twice, and all checksums. For each contradiction it prints where
-it is, what the file has there, and what to do. `info`, `plot`, `export` and `./kerf replay` compare the same, except for the files in
-`volumes/` and `inputs/`. They stop at a row that is damaged or out of order, and an export then writes nothing. For a log above 256 MB
-`info` prints the figures of the recorder at once and reads no row, which a line states. `info --scan` reads all rows.
+`./kerf record check DIR/log` compares all facts that the files contain twice, and all checksums. For each contradiction it prints
+where it is, what the file has there, and what to do. `info`, `plot`, `export` and `./kerf replay` compare the same, except for the
+files in `volumes/` and `inputs/`. They stop at a row that is damaged or out of order, and an export then writes nothing. For a log
+above 256 MB `info` prints the figures of the recorder at once and reads no row; it prints one line about this. `info --scan` reads all
+rows.
 
 A power cut leaves zeros, or half-written rows, behind the rows that the header counts. If the recorder did not end the log, such a torn
 part is left out, provided that no sound row follows it. One line has its size and position, and all commands work with the rows before
@@ -96,34 +97,34 @@ rights to read or write are missing.
 | content of the volumes | `volumes/` | `density_hash` of the scene, `initial_hash` |
 | all other facts, such as session, versions, end | `manifest.json` | `crc32`, its last member: zlib's CRC-32 of all bytes before the comma in front of it |
 | bytes of the other files | the files | `files` of the manifest: the CRC-32 of each file, from the moment at which the file was complete |
-| arm of each log | first row of each log | `first_rows` of the manifest: their `crc32c` |
-| list of files | the folder | `parts` of the manifest: files of the log that had begun; `files` |
+| which arm a log belongs to | first row of each log | `first_rows` of the manifest: their `crc32c` |
+| list of files | the folder | `parts` (number of `ticks.npy` files that were begun) and `files` (their names) of the manifest |
 
-`crc32c` covers all of a row except `seq`. In a run `seq` is twice `tick`. Only in the log of a watched replay, which pauses at ticks
-without a record, it is less, and the difference never falls. So `seq` and `tick` rise from row to row. A changed bit of `seq` is found
-by its own row, by the next row, or by the losses in the manifest.
+`crc32c` covers all of a row except `seq`. In a run `seq` is twice `tick`. A watched replay pauses at ticks without a record. In its
+log `seq` is less than twice `tick`, and this difference never becomes smaller. So `seq` and `tick` rise from row to row. A changed bit
+of `seq` is found by its own row, by the next row, or by the losses in the manifest.
 
-`np.load` compares nothing. It does not detect rows that are damaged, doubled, exchanged or of another run, or a manifest of another log.
-`kerf_reader.Log` compares what `info` compares, and raises `ValueError`. It does not compare `config_hash` and the figures of the
-summary themselves, but has two CRC-32 for them. No reader can detect the following faults; a replay may show them:
+`np.load` compares nothing. It does not detect rows that are damaged, doubled, exchanged or of another run, or a manifest of another
+log. `kerf_reader.Log` compares what `info` compares, and raises `ValueError`. It does not compute `config_hash` and the figures of the
+summary again. Two CRC-32 protect them. No reader can detect the following faults; a replay may show them:
 
 * in a log whose recorder was killed: whether rows behind the count of the header are missing because they were cut off or torn, or
   because ticks were lost;
-* in such a log in lock-step: rows of another run of the same scene. Time is virtual, so the first rows may be the same, and all checksums
-  of a file of rows are in this file;
+* in such a log in lock-step: rows of another run of the same scene. Time is virtual, so the first rows may be the same. Each file of
+  rows contains its own checksums, so a foreign file also agrees with itself;
 * exchanged logs of two arms, if the recorder was killed before the manifest had `first_rows`, which it has after the first 200 ms;
 * in logs of earlier versions, which have no `crc32`: the facts that only the manifest has;
 * all facts that only a lost manifest had, after it was made again.
 
 `./kerf record check DIR/log --repair` makes a lost or wrong `manifest.json` again, from scene and rows. The old one is kept as
 `manifest-old.json`. The facts that only the old one had (session, versions, end of the run) are then unknown, because nothing proves
-them. `info` reports who made the manifest again.
+them. `info` reports which version of kerf made the manifest again.
 
-* If the wrong manifest still has a checksum that can be read (`files`, `first_rows`, `config_hash`) and that is not the checksum of its
-  file, the file was changed, too. Then one line names the file, and nothing is written.
-* If the manifest is lost, or is no JSON, there is nothing to compare with. The new manifest then has the checksums of the files as they
-  are now. It proves what scene and rows prove: `density_hash` and the `crc32c` of each row. It does not prove that scene, clock, inputs
-  and the log of each arm are those of the run. It lists only files that a recording has.
+* If the wrong manifest still has a readable checksum (`files`, `first_rows`, `config_hash`) and this checksum does not match its file,
+  the file was changed, too. Then one line names the file, and nothing is written.
+* If the manifest is lost, or is no JSON, there is nothing to compare with. The new manifest then has the checksums of the files as
+  they are now. It proves only that the rows and the volumes are intact (`crc32c` of each row, `density_hash`). It does not prove that
+  scene, clock, inputs and the log of each arm are those of the run. It lists only files of the kinds in the first table.
 
 The recorder writes the manifest again when the volumes are on the disk, when a file of the log begins, and when `clock.npy` gets a row.
 So the log of a killed recorder is compared like any other log. `check` also names each file in `volumes/` or `inputs/`, and each file
@@ -148,7 +149,7 @@ column to 1e-9 J. In a run with two devices, each device has its own rows and it
 
 `examples/python/port_energy.py` does this for a log. The log must have all ticks (`lost_ticks` is 0), and `servo.numeric` must be
 `fixed`. In a row with the command `restart` the motors were off, so the forces before this row count as 0. With a `workspace_scale`
-below 1 a step of `position_mm` (2^-16 mm) is more than a step of the device, and the result is off by up to 1e-7 J at 0.4. From
+below 1 a step of `position_mm` (2^-16 mm) is more than a step of the device, and the result is off by up to 1e-7 J at a `workspace_scale` of 0.4. From
 `encoder_counts` the tip is exact at any scale: `device_tip.from_counts` in the same folder computes it for Omni, Inverse3, Touch and
 omega.
 
@@ -159,8 +160,8 @@ omega.
     ./kerf record export DIR/log --csv run.csv
 
 **MCAP** opens in Foxglove and its open forks, in PlotJuggler and with ROS 2 (`ros2 bag`). The definitions of the messages are in the
-file. Times are UTC. With `--time monotonic` they are `start_ns`; a log without a date has only these (one line reports it). A date
-before 1970 or after 2038-01-19 is refused, because ROS 2 has no such date. The column `start_ns` is not changed.
+file. Times are UTC. With `--time monotonic` they are `start_ns`. If the log has no date, the times are always `start_ns`, and one line
+reports it. A date before 1970 or after 2038-01-19 is refused, because ROS 2 has no such date. The column `start_ns` is not changed.
 
 | topic | message | rate |
 |---|---|---|
@@ -176,10 +177,10 @@ ROS 2 that use `/kerf/tick`, copy `ros/kerf_msgs` (installed: `share/kerf/ros/ke
 `colcon build`, and play the file by `ros2 bag play run.mcap`. The constants of the message (`FLAGS_CONTACT`, `FAULT_OVERSPEED`) are the
 bits and codes below.
 
-Chunks are compressed by LZ4, unless `--unpacked` is given. The other files of the recording are attached, with the volumes as they were
-at the start. So the MCAP of a whole recording replays on kerf's page ([kerf in a browser](second-machine.md#kerf-in-a-browser)). With
-`--from` or `--until` the file has the messages alone. `ticks.npy.head` is the header of the log. The rows of the log are the bytes of
-`/kerf/tick` behind the four bytes of CDR.
+Chunks are compressed by LZ4, unless `--unpacked` is given. The other files of the recording are attached, with the volumes as they
+were at the start. So the MCAP of a whole recording replays on kerf's page ([kerf in a browser](second-machine.md#kerf-in-a-browser)).
+With `--from` or `--until` the file has the messages alone. `ticks.npy.head` is the header of the log. To restore `ticks.npy`, write
+this header, then each `/kerf/tick` message without its first four bytes (the CDR header).
 
 **HDF5** opens in MATLAB (`h5read("run.h5", "/ticks/position_mm")`), Octave (`load -hdf5 run.h5`), Julia, R and h5py. It has one dataset
 for each column, `/ticks/COLUMN`, with the attributes `units`, `description` and `valid`. If the values are codes or bits, the attribute
