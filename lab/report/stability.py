@@ -49,8 +49,8 @@ stiffness gets five presses for each seed:
 A cell has the worst verdict of its presses. `--push`, `--hit` and `--start` fix the push, the speed and the distance. A
 list of values makes one of them an axis of the map.
 
-The verdicts follow. All except the first are columns of `--csv`. In them E1 is the work of the push over one encoder step. A
-loop without encoder steps has 0.0001 mm in place of the step.
+The verdicts follow. All verdicts except the first are columns of `--csv`. E1 is the work of the push over one encoder step.
+A loop without encoder steps has 0.0001 mm in place of the step.
 
 * *settles*: this is proven for each press, in one of two ways. Either friction holds the tip under a constant force, for so
   long that no earlier motion can still act through the delay or the velocity window. Or, in the last half of the run, the
@@ -71,10 +71,10 @@ How a map is searched:
   the motion slower. With friction and encoder steps an oscillation is chaotic: one run in a hundred stops only after 3 to
   45 s. `--seconds` makes the limit longer, never shorter.
 * *First* is the lowest K of a column at which a run of any seed oscillates or is active; such a press is called bad. The
-  search goes upwards in steps of 1 % to the first bad press. From there it goes down in steps of 2 %, as long as this press
-  is still bad, or a press with a push, speed or distance close to it. Then the last step is halved until it is 0.5 %. For
-  the whole arm the search goes upwards in the steps of the map, and only halves the last one until it is 0.5 %. Each cell
-  above *first* is also run with the press that was bad at *first*.
+  search goes upwards in steps of 1 % to the first bad press. From there it goes down in steps of 2 %, as long as the same
+  press, or one with a similar push, speed and distance, is bad at the lower K too. Then the last step is halved until it is
+  0.5 %. For the whole arm the search goes upwards in the steps of the map, and only halves the last one until it is 0.5 %.
+  Each cell above *first* is also run with the press that was bad at *first*.
 * A picture has a bar from the lowest to the highest *first* of the seeds. Stable cells above *first* are reported
   separately, as re-entry.
 * With friction the worst push is about half of the peak force. Then the force can oscillate with the largest amplitude
@@ -101,7 +101,8 @@ The table has the lowest K in N/mm that oscillates or is active. Each device has
 with the highest K on the device's map.
 
 * *Linear, exact* is the boundary of another loop: a linear two-sided wall with the backward difference as velocity, in
-  double, without friction, encoder steps and limits. It is a solid line in a picture of that loop, and dotted in all others.
+  double, without friction, encoder steps and limits. It is a solid line in a picture of that loop, and a dotted line in the
+  pictures of all other loops.
 * The firm hand has 0.1 kg, 0.005 N s/mm and 0.5 N/mm. In the column *whole arm* a spring of 0.2 N/mm pushes the tip, not a
   constant force.
 * Each measured K is the lowest of five seeds. Undecided counts as unstable. The map of the whole arm has 14 stiffnesses.
@@ -208,7 +209,7 @@ another one.
 """
 
 ANSWER = """
-So it may render {k} N/mm at B = {b} N s/mm: the lowest K divided by 1.5, as in the table of devices. The next command
+So this device may render {k} N/mm at B = {b} N s/mm: the lowest K divided by 1.5, as in the table of devices. The next command
 measures the same wall at several frequencies:
 
 """
@@ -218,6 +219,10 @@ At {hz} Hz a hand feels {wall_k} N/mm and {wall_b} N s/mm of the wall. That is s
 theory (docs/forces.md 5.8), because `foaw` lags behind the backward difference of the theory. At the device's port the hand
 feels {port_k} N/mm and {port_b} N s/mm, because the inertia of the device counts as a negative stiffness. At frequencies
 with negative damping the hand gets energy, unless its own damping takes more.
+
+The line *furthest from theory* has the largest deviation of all rows. The theory assumes the estimator `difference` and no
+stabiliser. The last line has two dampings: the one from which on device and wall would be passive with any hand, and the one
+that the device has.
 
 `--estimator difference` gives the wall of the theory. `--arm` measures the whole servo step with an emulated device. `--log
 DIR` measures the wall from a recording ([log](log.md)). For such a recording move your hand to and fro in the wall, faster
