@@ -55,9 +55,9 @@ packet. A packet with another value is refused.
 **Packet counter**: increases by 1 in each packet. kerf compares it with the newest packet that it accepted:
 
 * 1 to 160 ahead: accepted.
-* 161 to 16,000 ahead: refused. A second packet, 1 to 160 ahead of the refused one, is accepted.
-* Any other counter is that of an old packet: refused. But after 160 ticks without an accepted packet (the motors are then off)
-  a second packet is accepted that is 1 to 160 ahead of the refused one.
+* 161 to 16,000 ahead: refused. If the next packet is 1 to 160 ahead of the refused one, it is accepted.
+* Any other counter is that of an old packet: refused. After 160 ticks without an accepted packet (the motors are then off) the
+  next packet is accepted here too if it is 1 to 160 ahead of the refused one.
 
 **Counts to joints**, in rad, with c = 2 pi / {number('kCountsPerRev')}. `dock` is the count in the inkwell. q1 turns the turret to the left. q2 is the
 angle of the thigh above the horizontal. q3 is the angle of the forearm from straight down, outwards. All three angles are
@@ -100,7 +100,8 @@ A report with a byte that this layout does not allow is refused. The numbers of 
 
 **Speaks first**: the host, with a packet without torque. The device answers each packet of the host with one report.
 
-**Counts to joints**: t1 is the angle of a leg's thigh. Once the leg is homed, t1 = {plain(file.numbers('kZeroRad')[0])} degrees + 2 pi count / ({number('kShaftCountsPerRev')} * {plain(number('kThighWheelMm'))} / {plain(number('kShaftMm'))}).
+**Counts to joints**: t1 is the angle of a leg's thigh, from u towards w (below). Once the leg is homed,
+t1 = {plain(file.numbers('kZeroRad')[0])} degrees + 2 pi count / ({number('kShaftCountsPerRev')} * {plain(number('kThighWheelMm'))} / {plain(number('kShaftMm'))}).
 A larger t1 moves the grip towards the user. Counts start at 0 at power-up and jump when the leg is homed.
 
 **Tip to joints**, for the leg at the azimuth phi = {azimuths} degrees (about z, from x to y), in mm: a = {plain(number('kThighMm'))},
@@ -154,8 +155,8 @@ current increases the count. The torque scales of the emulated device are 0.4144
 reverses the counts and the motor of a joint.
 
 **Calibration**: the user holds the home pose (A = B = 0, C = pi/2) and presses the button. The word at 12 stays 1 until the host
-sets the encoders. kerf sets them to {home}, 0, 0, 0, with zero current. The arm counts as parked until a joint is more
-than 40 counts from these values.
+sets the encoders. kerf sets them to {home}, 0, 0, 0, with zero current. The arm is parked until a joint is more than
+40 counts away from these values.
 """
 
 
@@ -192,7 +193,9 @@ or whose orientation has a length that differs from 1 by more than 1 %. The forc
 
 * the emulator sends the force that its motors exert;
 * `kerf-arm` sends the force that it passed to the vendor's library in the previous frame, which the device may not have exerted;
-* `kerf-arm` for the Inverse3 sends the force that the service reports since version 3.5, and 0 with older versions.
+* `kerf-arm` for the Inverse3 sends the force that the service reports. Before 3.5 the service reports none, so the force is 0.
+
+The servo rounds each axis of the position to a whole number of counts. *Parked* is how the user sets the bit `parked`.
 
 | device | one count of the servo, um | resolution, um | reports orientation | parked | workspace of the emulated device, mm | peak N, continuous N, slew N/ms |
 |---|---|---|---|---|---|---|
@@ -204,7 +207,8 @@ or whose orientation has a length that differs from 1 by more than 1 %. The forc
 
 **Force**: the device exerts the force only while the byte at 10 is 1, and clamps the force to its peak.
 
-**Torque scale**: the ratio of true force to commanded force along x, y, z; 1 for the emulated devices.
+**Torque scale**: of these devices it is no torque, but the ratio of true force to commanded force along x, y, z. It is 1
+for the emulated devices.
 
 **Calibration**: kerf calibrates when the device has been parked, homed and powered for 50 ms and no axis has moved by more than
 two steps of its resolution.
@@ -249,19 +253,20 @@ def links(root):
 The controller (`--port`) and an emulator communicate over a Unix socket of type SOCK_SEQPACKET, or over UDP. **One message is
 one packet** of the device as listed above, with no header or trailer. The emulator listens; the controller connects.
 
-1. **Hello.** The controller sends the first hello, and over UDP repeats it every 200 ms until the emulator answers with a hello.
-   In lock-step the two hellos are equal if the settings fit. The controller drops all packets that the device sends before
-   the answer. If the devices differ, if only one side runs in lock-step, or if the rates differ in lock-step, the emulator
-   answers and then ends the link. The emulator also serves a host that sends no hello.
+1. **Hello.** The controller sends the first hello, and over UDP repeats it every 200 ms until the emulator answers with a
+   hello. In lock-step the emulator's hello equals the controller's if device, mode and rate agree. The controller drops
+   all packets that the device sends before the answer. If the devices differ, if only one side runs in lock-step, or if
+   the rates differ in lock-step, the emulator answers and then ends the link. The emulator also serves a host that sends
+   no hello.
 2. **First packet.** After the hellos, the side that "speaks first" above sends its packet. An Omni's first report follows the
    emulator's hello.
 3. **In real time** each side sends at the rate of its clock and reads the newest packet.
 4. **In lock-step** the device sends one packet for each packet of the host: its state one tick later. Each side waits for the
-   other, never for a clock. A device that has nothing to send in a tick therefore sends a turn (see the table) without
+   other, never for a clock. So a device that has no packet for a tick sends a *turn* (see the table) without
    packets. A turn that contains packets means the same as these packets sent one by one. The emulator sends turns only if it
    plays a script of faults. The host sends no turns.
 5. **End by the host.** The last packet of the host switches the motors off. Then the host closes the socket, or sends an empty
-   datagram over UDP. An empty datagram has no effect as the host's first datagram. Over UDP, 2 s without a datagram from the
+   datagram over UDP. If the host's first datagram is empty, it has no effect. Over UDP, 2 s without a datagram from the
    host also end the link.
 6. **End by the device.** The device calls `shutdown(SHUT_WR)` or `close`, or sends an empty packet; over UDP it sends an empty
    datagram. The controller then reads no more. From the next tick on, each packet that it sends switches the motors off. It
