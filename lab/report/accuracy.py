@@ -47,8 +47,8 @@ What a hand can notice:
 
 So with the standard settings the largest error of the direction is {direction} times smaller than a hand can notice, and the
 largest error of the force is {force} times smaller. With voxels half as wide a tick takes {fine_time} times as long, and the largest
-error of the direction is {fine_direction} instead of {standard_direction} degrees. Both angles are far below what a hand notices. So use small voxels
-for a shape that is thinner than two voxels; a hand does not need them.
+error of the direction is {fine_direction} instead of {standard_direction} degrees. Both angles are far below what a hand notices. So a hand does
+not need small voxels. Use them for a shape that is thinner than two voxels.
 
 """
 
@@ -62,11 +62,11 @@ The true force is that of the shape itself with sharp faces: F = -p0 SURFINT rho
 Forces are fractions of full scale, p0 pi R^2. `rms` and `max` are over all shapes unless stated.
 
 * `direction`: the angle to the true force, where this force is at least a tenth of full scale.
-* `loop`: |SUM dW| / SUM |dW| around tilted circles of 0.375 mm, of one sample or of the whole tool. It is the work that
-  a static tooth gives or takes on a closed path, and should be 0.
+* `loop`: |SUM dW| / SUM |dW| around tilted circles with a radius of 0.375 mm, for one sample or for the whole tool. It is
+  the work that a static tooth gives or takes on a closed path, and should be 0.
 * `us p50`, `p99`: times of one tick of the tool without milling. Q15 runs the fast kernels of the servo in the methods
-  `gather`, `aligned` and `splat`. Double runs the servo's template. Times in brackets are of plain loops of the lab (Q8, Q12,
-  splines, other interpolations). Do not compare them with other times.
+  `gather`, `aligned` and `splat`. Double runs the servo's C++ template, without fast kernels. Times in brackets are of
+  plain loops of the lab (Q8, Q12, splines, other interpolations). Do not compare them with other times.
 
 """
 
@@ -111,10 +111,10 @@ ORDER = ("order", "order", 1, "all")
 PROXY_COLUMNS = [SAMPLES, DEPTH, DEPTH_MAX, THEORY, THEORY_MAX, DIRECTION, DIRECTION_MAX, STEP_PERCENT]
 # Knob and what it is.
 PROXY_KNOBS = [
-    ("proxy voxel", "Edge of a voxel. The shapes keep their millimetres."),
+    ("proxy voxel", "Edge of a voxel. The shapes keep their size in mm."),
     ("proxy spacing", "Distance of the samples on the tool's surface, relative to the servo's own distance."),
     ("proxy numbers", "Number type of the loop."),
-    ("proxy kernels", "Instruction sets of this machine. They give the same bits. The rate of a scene is planned for each (docs/scenes.md)."),
+    ("proxy kernels", "Instruction sets of this machine. They give the same bits. kerf plans the rate of a scene for each of them (docs/scenes.md)."),
 ]
 
 # Knob, its text, its columns.
@@ -171,7 +171,7 @@ ADVICE = """\
 * Few samples favour `gather`, many `aligned`: {aligned|SAMPLES} samples take {int16 gradients|us} against {aligned|us} us, and {aligned 0.0625 mm|SAMPLES} (in voxels of 0.0625 mm)
   {0.0625 mm|us} against {aligned 0.0625 mm|us} us. The servo takes `aligned` if it can, because it also needs no memory and no refresh.
 * Fixed point: Q15, at most {Q15|DOUBLE_MAX} ppm away from double (Q12 {Q12|DOUBLE_MAX}, Q8 {Q8|DOUBLE_MAX}). All of them are {Q15|THEORY} % away from the true force. For
-  the hand Q8 would do; the 16 bits of the kernels hold Q15.
+  the hand Q8 would be enough. The kernels have Q15 because their 16 bits hold it.
 * A pitch of 1. Half of it takes {1/2|1} times as long for an error of {1/2|THEORY} instead of {1|THEORY} %. A pitch of 2 has {2|THEORY} %.
 * Gradients by `farid`: normals to {farid|NORMAL} deg rms (`sobel5` {sobel5|NORMAL}, `central` {central|NORMAL}). `central` blurs less, so its force
   is nearer to the true force ({central|THEORY} against {farid|THEORY} %). But it passes {central|NOISE} of the noise instead of {farid|NOISE}. And a closed path of

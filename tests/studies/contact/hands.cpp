@@ -65,7 +65,7 @@ void tell(const HandRun& run, const RowSink& add_row) {
   row(": largest step of the force in a tick", step_n, "N");
   row(": removed", run.ticks.empty() ? 0 : run.ticks.back().removed_mm3, "mm^3");
   row(": force above 150 Hz over the mean", 100 * chatter.share, "%", 2);
-  row(": the same, worst window of 0.128 s", 100 * chatter.worst, "%");
+  row(": force above 150 Hz, worst window of 0.128 s", 100 * chatter.worst, "%");
   row(": windows in contact", chatter.windows, "1");
   row(": ticks with a fault", double(run.faults), "ticks", 0);
 }

@@ -433,8 +433,8 @@ void measure_traps(const Effort& effort, const RowSink& add_row) {
   const double made = std::max(hard.made, 1);
   const std::string scenes = "presses of 5 s, from --seed " + std::to_string(effort.first_scene);
   row(scenes.c_str(), hard.made, "", {}, {});
-  row("of them with a force that must cut", 100 * hard.touched / made, "%", {}, {});
-  row("of them borne by a shaft", 100 * hard.by_shaft / made, "%", {}, {});
+  row("presses with a force that must cut", 100 * hard.touched / made, "%", {}, {});
+  row("presses that a shaft carries", 100 * hard.by_shaft / made, "%", {}, {});
   row("presses that stop cutting for over 0.5 s", hard.bad, "", 0, 0);
   if (hard.open + hard.repaired > 0) {
     row("presses known to stop, which do", hard.open, "", {}, 0);
