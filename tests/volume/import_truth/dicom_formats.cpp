@@ -439,7 +439,7 @@ constexpr SeriesRow kSeriesRows[] = {
          f.names.push_back("time2-" + std::to_string(k));
        }
      }},
-    {"orientation with noise of 1e-9, spacing of other digits, positions of one digit", kRead, "",
+    {"orientations that differ by 1e-9, spacings and positions rounded to few digits", kRead, "",
      [](Series& f) {
        Numbered& v = f.volume();
        const int kind = f.draw.below(3);
@@ -506,7 +506,7 @@ constexpr SeriesRow kSeriesRows[] = {
        }
        f.slices.clear();
      }},
-    {"below other folders, beside an index or a text", kRead, "",
+    {"slices in sub-folders, beside an index or a text file", kRead, "",
      [](Series& f) {
        f.folder.write("DICOMDIR", "an index");
        if (f.draw.coin()) f.folder.write("README.TXT", "x");
