@@ -19,7 +19,8 @@ namespace kerf {
 template <class N>
 struct VelocityPlan {
   std::int32_t rate_hz = 1000;
-  /// Ticks between the samples that are used: above 1 kHz a window still spans up to 16 ms.
+  /// Ticks between the samples that are used, 1 to `kMaxStride`: from 1 to 8 kHz a window still
+  /// spans up to 16 ms, above (in maps alone) 128 ticks.
   std::int32_t stride = 1;
   typename N::Real noise_mm{};  ///< largest error of an encoder reading
 };
@@ -198,10 +199,10 @@ class Foaw {
   using State = VelocityWindow<N>;
 
   explicit Foaw(const LawSetup& setup)
-      : plan_{
-            .rate_hz = static_cast<std::int32_t>(setup.rate_hz()),
-            .stride = std::max<std::int32_t>(1, static_cast<std::int32_t>(setup.rate_hz()) / 1000),
-            .noise_mm = typename N::Real(setup.tip_noise_mm())} {}
+      : plan_{.rate_hz = static_cast<std::int32_t>(setup.rate_hz()),
+              .stride = std::clamp<std::int32_t>(static_cast<std::int32_t>(setup.rate_hz()) / 1000,
+                                                 1, State::kMaxStride),
+              .noise_mm = typename N::Real(setup.tip_noise_mm())} {}
 
   [[nodiscard]] DeviceVec<typename N::Real> step(const VelocityInput<N>& in,
                                                  State& window) const noexcept {

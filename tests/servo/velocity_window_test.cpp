@@ -7,6 +7,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/law/velocity_estimators.hpp"
 
 namespace kerf::velocity_window_test {
@@ -51,6 +52,25 @@ Errors errors(int rate_hz, double velocity_mm_per_s) {
 }
 
 }  // namespace
+
+// A map may have 32 kHz, the servo 8.
+TEST_CASE_TEMPLATE("above 8 kHz the window reads the 128 ticks that it keeps, and no others", N,
+                   FixedNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  for (const double rate_hz : {8000.0, 16000.0, 32000.0}) {
+    const auto plan = plan_law<VelocityInput, N>({LawKind::velocity, "foaw", {}},
+                                                 LawLoop{.rate_hz = rate_hz, .tip_noise_mm = 1e-3});
+    LawMemory memory;
+    DeviceVec<Real> velocity{};
+    const auto moved_to = [&](double x_mm) {
+      velocity = plan(memory, {{Real(x_mm), Real(), Real()}, 1, !memory.begun});
+    };
+    for (int k = 0; k <= 400; ++k) moved_to(100 * k / rate_hz);
+    CHECK(double(velocity.x) == doctest::Approx(100).epsilon(0.01));
+    for (int k = 0; k <= 128; ++k) moved_to(100 * 400 / rate_hz);
+    CHECK(double(velocity.x) == 0);
+  }
+}
 
 TEST_CASE_TEMPLATE("S18: encoder steps of 0.055 mm at 1 kHz leave less than 0.6 mm/s", N,
                    FixedNumbers, DoubleNumbers) {
