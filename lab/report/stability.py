@@ -137,7 +137,7 @@ them.
 
 RATES = """\
 In the linear theory, without friction, the boundary grows in proportion to the rate. The measured boundary grows less, for
-two reasons. The encoder steps are the same at every rate. And at rates from 1 kHz the velocity window spans up to 16 ms: at
+two reasons. The encoder steps are the same at every rate. And at rates from 1 to 8 kHz the velocity window spans up to 16 ms: at
 a high rate this lag is more periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns
 the damping is unstable without any wall.
 
