@@ -34,6 +34,8 @@ class FirewireNode final : public OpenFilesNode<FirewireOpen>, private FirewireB
 
   FirewireNode(const FirewireSettings& settings, PacketDevice& device)
       : bus_(settings, device, *this) {}
+  /// The clients of what is still open leave the bus before it goes.
+  ~FirewireNode() override { opens_.clear(); }
 
   [[nodiscard]] bool present(int file) const noexcept override {
     return file == kHostFile || bus_.listed();
