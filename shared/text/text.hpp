@@ -42,10 +42,17 @@ namespace kerf {
   return shown;
 }
 
-/// `escaped`, cut after 400 bytes: for quotations from a file of the user.
+/// `escaped`, at most 400 bytes of it, so the same again gives the same: for quotations from a file
+/// of the user. No escape is cut.
 [[nodiscard]] inline std::string one_line(std::string_view text) {
   constexpr std::size_t kLongestLine = 400;
-  return escaped(text.substr(0, kLongestLine));
+  text = text.substr(0, kLongestLine);
+  std::string shown = escaped(text);
+  while (shown.size() > kLongestLine) {
+    text.remove_suffix(1);
+    shown = escaped(text);
+  }
+  return shown;
 }
 
 /// Levenshtein distance of two words.

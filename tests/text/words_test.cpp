@@ -24,6 +24,10 @@ TEST_CASE("the control characters of UTF-8 too, and nothing is read beyond the e
 TEST_CASE("what is quoted of a file is cut where nobody would read on") {
   CHECK(one_line("a\nb") == "a\\nb");
   CHECK(one_line(std::string(1000, 'x')).size() == 400);
+  const std::string tabs = one_line("x" + std::string(400, '\t'));
+  CHECK(tabs.size() == 397);  // of 400 bytes, four for each tab, and no part of one
+  CHECK(tabs.ends_with("\\x09"));
+  CHECK(one_line(tabs) == tabs);
 }
 
 }  // namespace kerf::words_test
