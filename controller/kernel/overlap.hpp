@@ -47,13 +47,16 @@ struct OverlapBox {
   return static_cast<std::size_t>(square_root(square) * pitch_mm / spacing_mm) + 4;
 }
 
-/// Entries that `OverlapBox::memory` needs for this tool in this volume, in any orientation.
+/// Entries that `OverlapBox::memory` needs for this tool in this volume, in any orientation. Only
+/// cells that touch the volume count, so the box sticks out of it by at most one voxel at each end.
 [[nodiscard]] inline std::size_t overlap_capacity(
-    const std::array<std::int32_t, 3>& size_pitches, double pitch_mm,
+    const VoxelGrid& grid, const std::array<std::int32_t, 3>& size_pitches, double pitch_mm,
     const std::array<double, 3>& spacing_mm) noexcept {
-  return overlap_width(size_pitches, pitch_mm, spacing_mm[0]) *
-         overlap_width(size_pitches, pitch_mm, spacing_mm[1]) *
-         overlap_width(size_pitches, pitch_mm, spacing_mm[2]);
+  const auto width = [&](std::size_t axis, std::int32_t voxels) {
+    return std::min(overlap_width(size_pitches, pitch_mm, spacing_mm[axis]),
+                    static_cast<std::size_t>(voxels) + 2);
+  };
+  return width(0, grid.nx) * width(1, grid.ny) * width(2, grid.nz);
 }
 
 namespace detail {

@@ -159,11 +159,40 @@ TEST_CASE("the memory sized for a tool is enough in any orientation, at any pitc
         step = static_cast<std::int32_t>(std::lround(step * pitch / spacing[a]));
       }
     }
-    std::vector<std::int32_t> memory(overlap_capacity(size, pitch, spacing));
+    std::vector<std::int32_t> memory(overlap_capacity({400, 400, 400}, size, pitch, spacing));
     OverlapBox<FixedNumbers> box{memory, {}, 0};
     HOLDS(!overlap({400, 400, 400}, corners, pose, FixedNumbers::kStepOne, box).empty());
     HOLDS(static_cast<std::size_t>(box.box.extent().x) <= overlap_width(size, pitch, spacing[0]));
   }));
+}
+
+TEST_CASE(
+    "in a volume smaller than the tool the memory is the volume's and its rim's, and enough") {
+  std::size_t full = 0;
+  CHECK(property([&] {
+    const auto seed = any<std::uint32_t>();
+    std::mt19937 random(seed);
+    const auto within = [&](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    const auto voxels = [&] { return 1 + static_cast<std::int32_t>(random() % 5); };
+    const VoxelGrid grid{voxels(), voxels(), voxels()};
+    const auto tool = paper_ball(11);
+    auto pose =
+        turned_pose({within(-3, grid.nx + 3), within(-3, grid.ny + 3), within(-3, grid.nz + 3)},
+                    {within(-1, 1), within(-1, 1), within(-1, 1), 1.1});
+    std::vector<std::int32_t> memory(overlap_capacity(grid, {11, 11, 11}, 1, {1, 1, 1}));
+    HOLDS(memory.size() <= VoxelGrid{grid.nx + 2, grid.ny + 2, grid.nz + 2}.voxel_count());
+    OverlapBox<FixedNumbers> box{memory, {}, 0};
+    const bool touches = std::ranges::any_of(tool, [&](const ToolOffset& offset) {
+      return cell_at<FixedNumbers>(sample_position(pose, offset)).touches(grid);
+    });
+    static_cast<void>(overlap(grid, tool, pose, FixedNumbers::kStepOne, box));
+    HOLDS(box.box.empty() != touches);
+    const VoxelIndex size = box.box.extent();
+    full += VoxelGrid{size.x, size.y, size.z}.voxel_count() == memory.size() ? 1 : 0;
+  }));
+  CHECK(full > 10);  // the bound is reached
 }
 
 TEST_CASE("a box too large for its memory, a far tool and an empty one cover nothing") {

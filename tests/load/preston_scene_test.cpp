@@ -240,7 +240,8 @@ TEST_CASE_TEMPLATE("the tables cut a block: each material at its rate, at the sa
     auto plan = plan_preston<N>(scene, volume);
     plan.labels = volume.image.labels;
     std::vector<CoveredVoxel<N>> memory(max_covered_voxels(tool, volume));
-    const std::size_t capacity = overlap_capacity(tool.size_vox, tool.pitch_mm, {0.1, 0.2, 0.25});
+    const std::size_t capacity =
+        overlap_capacity(volume.image.grid, tool.size_vox, tool.pitch_mm, volume.image.spacing_mm);
     std::vector<typename N::Weight> ratios(capacity);
     OverlapBox<N> box{ratios, {}, 0};
     ToolPose<N> pose;

@@ -35,7 +35,8 @@ class GatherMethod final : public ToolMethod {
       memory.hold_samples(tool, SampleOrder::as_given);
     }
     if (cut != CutModel::none) {
-      memory.need(memory.lengths.overlap, overlap_capacity(tool.size_vox, tool.pitch_mm, h));
+      memory.need(memory.lengths.overlap,
+                  overlap_capacity(in.volume.image.grid, tool.size_vox, tool.pitch_mm, h));
     }
     if (cut == CutModel::preston) return nullptr;
     memory.need(memory.lengths.gradients[v], in.volume.image.grid.voxel_count() + kFieldPad);
