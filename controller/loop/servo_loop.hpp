@@ -88,6 +88,9 @@ struct RunRecord : ArmRecord {
   void add_event(std::uint64_t tick, const char* name) noexcept { events.add(tick, name); }
   void add_fault(std::uint64_t tick, const char* name) noexcept { faults.add(tick, name); }
   [[nodiscard]] ArmRecord& arm(std::size_t index) noexcept { return index == 0 ? *this : second; }
+  [[nodiscard]] const ArmRecord& arm(std::size_t index) const noexcept {
+    return index == 0 ? *this : second;
+  }
   [[nodiscard]] bool has_faults() const noexcept { return faults.count + second.faults.count > 0; }
 };
 

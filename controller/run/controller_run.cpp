@@ -388,12 +388,9 @@ void look_at_scene(const ControllerOptions& options) {
   check_gains(options, second, gain_margin(second));
 }
 
-/// The run from the first packet of the device to the report.
-int run_with_device(const ControllerOptions& options, std::int64_t began_ns, RunStart& start,
-                    std::atomic<bool>& stop, RunReport& report) {
-  const LoadedScene& scene = start.planned.scene;
-  CompiledScene& servo = *start.planned.servo;
-  SegmentWriter& segment = start.segment;
+/// A driver at each port, begun.
+std::vector<std::unique_ptr<DeviceDriver>> start_drivers(const LoadedScene& scene,
+                                                         RunStart& start) {
   std::vector<std::unique_ptr<DeviceDriver>> drivers;
   for (std::size_t arm = 0; arm < start.ports.size(); ++arm) {
     const DeviceSettings& device = device_of(scene, arm);
@@ -401,33 +398,35 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
                                   scene.servo.rate_hz));
     drivers.back()->start();
   }
-  const Devices devices(*drivers[0], drivers.size() > 1 ? drivers[1].get() : nullptr);
-  if (!options.virtual_time) {
-    report.missing_rights = lock_memory();
-    if (!segment.locked() && report.missing_rights.empty()) {
-      report.missing_rights.push_back({"locked segment", "page faults may delay a tick"});
-    }
-    accept_rights(report.missing_rights, options.real_time.strict);
+  return drivers;
+}
+
+/// For a run in real time; `report` has what this process may not do.
+void take_rights(const ControllerOptions& options, const SegmentWriter& segment,
+                 RunReport& report) {
+  report.missing_rights = lock_memory();
+  if (!segment.locked() && report.missing_rights.empty()) {
+    report.missing_rights.push_back({"locked segment", "page faults may delay a tick"});
   }
+  accept_rights(report.missing_rights, options.real_time.strict);
+}
 
-  report.record.pulp = pulp_heat(scene);
-  segment.set_lifecycle(Lifecycle::run);
-  report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
-  const EndReason end =
-      run_threads({options, start.port_texts, scene, scene.servo.rate_hz, segment, start.server,
-                   servo, start.external.get(), devices, stop, report});
-  if (!options.virtual_time) unlock_memory();
-
-  const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
-  segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
-  report.end = text_of(end);
-  for (std::size_t arm = 0; arm < devices.size(); ++arm) {
+/// Faults and late forces, each with its way out, as warnings.
+void tell_of_faults(const RunStart& start, const RunReport& report) {
+  const LoadedScene& scene = start.planned.scene;
+  for (std::size_t arm = 0; arm < start.ports.size(); ++arm) {
     const EventList& faults = report.record.arm(arm).faults;
     const std::string name = scene.second ? "arm " + std::to_string(arm + 1) + ": " : "";
     name_law_faults(scene, faults, name);
     explain_faults(faults, start.port_texts[arm], name);
   }
   if (start.external) tell_of_forces(*start.external, scene.force.stale_ms);
+}
+
+/// What the scene's volumes, its tools and the links have come to.
+void report_results(const RunStart& start, const Devices& devices, RunReport& report) {
+  const LoadedScene& scene = start.planned.scene;
+  const CompiledScene& servo = *start.planned.servo;
   report.removed_density_mm3 = removed_density_mm3(scene, report.record);
   const std::vector<double> removed = removed_mm3(scene, servo);
   report.removed_mm3 = std::accumulate(removed.begin(), removed.end(), 0.0);
@@ -444,10 +443,35 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
                       2 * tool.radius_mm,    devices[1].lost(),
                       devices[1].refused(),  start.ports[1]->counters()};
   }
+  report.volume_hash = hash_of_volumes(servo, scene.volumes.size());
+}
+
+/// The run from the first packet of the device to the report.
+int run_with_device(const ControllerOptions& options, std::int64_t began_ns, RunStart& start,
+                    std::atomic<bool>& stop, RunReport& report) {
+  const LoadedScene& scene = start.planned.scene;
+  CompiledScene& servo = *start.planned.servo;
+  SegmentWriter& segment = start.segment;
+  const auto drivers = start_drivers(scene, start);
+  const Devices devices(*drivers[0], drivers.size() > 1 ? drivers[1].get() : nullptr);
+  if (!options.virtual_time) take_rights(options, segment, report);
+
+  report.record.pulp = pulp_heat(scene);
+  segment.set_lifecycle(Lifecycle::run);
+  report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
+  const EndReason end =
+      run_threads({options, start.port_texts, scene, scene.servo.rate_hz, segment, start.server,
+                   servo, start.external.get(), devices, stop, report});
+  if (!options.virtual_time) unlock_memory();
+
+  const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
+  segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
+  report.end = text_of(end);
+  tell_of_faults(start, report);
+  report_results(start, devices, report);
   if (const std::int64_t first_ns = report.record.first_force_ns; first_ns > 0) {
     report.start_to_force_ms = static_cast<double>(first_ns - began_ns) / 1e6;
   }
-  report.volume_hash = hash_of_volumes(servo, scene.volumes.size());
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));
   if (!options.final_volume.empty()) write_final(options, scene, servo);

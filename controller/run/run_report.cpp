@@ -165,14 +165,18 @@ std::string second_lines(const ArmReport& arm, const ArmRecord& r) {
          lines("fault", r.faults) + "\n";
 }
 
+Json rights_of(const std::vector<MissingRight>& rights) {
+  Json list = Json::List{};
+  for (const MissingRight& right : rights) {
+    list.push_back({{"what", right.what}, {"effect", right.effect}});
+  }
+  return list;
+}
+
 }  // namespace
 
 std::string report_json(const RunReport& report) {
   const RunRecord& r = report.record;
-  Json missing = Json::List{};
-  for (const MissingRight& right : report.missing_rights) {
-    missing.push_back({{"what", right.what}, {"effect", right.effect}});
-  }
   Json json{
       {"program", "kerf-controller"},
       {"version", KERF_VERSION},
@@ -221,7 +225,7 @@ std::string report_json(const RunReport& report) {
       {"lost_packets", report.lost_packets},
       {"refused_packets", report.refused_packets},
       {"link", json_of(report.link)},
-      {"missing_rights", missing},
+      {"missing_rights", rights_of(report.missing_rights)},
       {"load_s", report.load_s},
       {"start_to_force_ms", report.start_to_force_ms},
       {"volume_hash", hex64(report.volume_hash)},

@@ -46,7 +46,8 @@ DeviceDirection worst_direction(const IdentifiedDevice& device, double damping_n
     return true;
   };
   for (int code = 14; code < 27; ++code) {
-    try_along({double(code / 9 - 1), double(code / 3 % 3 - 1), double(code % 3 - 1)});
+    const int x = code / 9 - 1, y = code / 3 % 3 - 1, z = code % 3 - 1;
+    try_along({double(x), double(y), double(z)});
   }
   // Two of them are at most 45 degrees apart. A step along x, y or z is one on the sphere, too; the
   // one along the direction itself leads nowhere.

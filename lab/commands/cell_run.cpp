@@ -283,6 +283,48 @@ CellResult result_of(int exit, const std::filesystem::path& folder, const std::s
   return result;
 }
 
+std::vector<std::string> controller(const CellJob& job, const std::filesystem::path& folder) {
+  const auto at = [&](const char* name) { return (folder / name).string(); };
+  std::vector<std::string> words{program_beside("controller"), "--scene", job.scene};
+  for (const std::string& setting : job.settings) {
+    words.insert(words.end(), {"--set", setting});
+  }
+  words.insert(words.end(),
+               {"--device", device_of(job), "--port", "socket:" + at("device"), "--seconds",
+                number_text(job.seconds), "--name", job.name, "--virtual", "--until", at("until"),
+                "--emulator-args", at("told"), "--report", at("report.json")});
+  if (setting_of(job, "device.torque_scale").empty()) {
+    // The emulated motors are known; a scene says nothing of them, because a real device's are not.
+    words.insert(words.end(),
+                 {"--torque-scale", lines_of(text_in(folder / "describe"))["torque_scale"]});
+  }
+  return words;
+}
+
+/// The emulator that the controller has asked for in the file `told`.
+std::vector<std::string> emulator_as_told(const CellJob& job, const std::filesystem::path& folder) {
+  Lines told = lines_of(text_in(folder / "told"));
+  std::string& hand = told["hand_script"];
+  if (hand.empty()) hand = find_data_file("scenes/hands/cut_cavity.toml");  // as the demo
+  std::vector<std::string> words{"--front",
+                                 "socket",
+                                 "--socket",
+                                 (folder / "device").string(),
+                                 "--hand",
+                                 hand,
+                                 "--unit-mm",
+                                 told["hand_unit_mm"],
+                                 "--lockstep",
+                                 "--rate",
+                                 told["rate_hz"],
+                                 "--report",
+                                 (folder / "emulator.json").string()};
+  if (const std::string identified = told["identified"]; !identified.empty()) {
+    words.insert(words.end(), {"--identified", identified});
+  }
+  return emulator(job, words);
+}
+
 }  // namespace
 
 const std::vector<std::string>& result_columns() {
@@ -302,8 +344,6 @@ std::string emulator_refusal(const CellJob& job, const std::filesystem::path& fo
 
 std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::path& folder,
                                    const std::atomic<bool>& stop) {
-  const auto at = [&](const char* name) { return (folder / name).string(); };
-  // The emulated motors are known; a scene says nothing of them, because a real device's are not.
   Child described(emulator(job, {"--describe"}), folder / "describe");
   const auto known = end_of(described, stop, kGrace);
   if (!known) return std::nullopt;
@@ -312,57 +352,29 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   // A word that is no device's is refused by the programs.
   const Personality personality = personality_of(device_of(job)).value_or(Personality{});
   TickFollower ticks(job.name, folder / "until", personality);
-  std::vector<std::string> servo{program_beside("controller"), "--scene", job.scene};
-  for (const std::string& setting : job.settings) {
-    servo.emplace_back("--set");
-    servo.push_back(setting);
-  }
-  for (const std::string& word :
-       {std::string("--device"), device_of(job), std::string("--port"), "socket:" + at("device"),
-        std::string("--seconds"), number_text(job.seconds), std::string("--name"), job.name,
-        std::string("--virtual"), std::string("--until"), at("until"),
-        std::string("--emulator-args"), at("told"), std::string("--report"), at("report.json")}) {
-    servo.push_back(word);
-  }
-  if (setting_of(job, "device.torque_scale").empty()) {
-    servo.emplace_back("--torque-scale");
-    servo.push_back(lines_of(text_in(folder / "describe"))["torque_scale"]);
-  }
-  Child controller(servo, folder / "controller");
+  Child servo(controller(job, folder), folder / "controller");
   while (!std::filesystem::exists(folder / "told")) {
     if (stop) return std::nullopt;
-    if (const auto code = controller.ended())
-      return result_of(*code, folder, controller.last_line());
+    if (const auto code = servo.ended()) return result_of(*code, folder, servo.last_line());
     std::this_thread::sleep_for(kLook);
   }
-  Lines told = lines_of(text_in(folder / "told"));
-  std::string& hand = told["hand_script"];
-  if (hand.empty()) hand = find_data_file("scenes/hands/cut_cavity.toml");  // as the demo
-  std::vector<std::string> words{
-      "--front",          "socket", "--socket",      at("device"),
-      "--hand",           hand,     "--unit-mm",     told["hand_unit_mm"],
-      "--lockstep",       "--rate", told["rate_hz"], "--report",
-      at("emulator.json")};
-  if (const std::string identified = told["identified"]; !identified.empty()) {
-    words.insert(words.end(), {"--identified", identified});
-  }
-  Child device(emulator(job, words), folder / "emulator");
+  Child device(emulator_as_told(job, folder), folder / "emulator");
   const auto end = Clock::now() + kLongestRun;
-  while (!controller.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {
+  while (!servo.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {
     if (stop) return std::nullopt;
     ticks.poll();
     std::this_thread::sleep_for(kLook);
   }
   ticks.poll();
-  if (!controller.ended()) {
+  if (!servo.ended()) {
     const auto refused = device.ended();
-    controller.signal(SIGKILL);
+    servo.signal(SIGKILL);
     return result_of(
         refused.value_or(2), folder,
         refused ? device.last_line() : "kerf-controller: no end after 30 minutes; killed");
   }
   if (!end_of(device, stop, kGrace)) return std::nullopt;
-  return result_of(*controller.ended(), folder, controller.last_line(), ticks.swing());
+  return result_of(*servo.ended(), folder, servo.last_line(), ticks.swing());
 }
 
 }  // namespace kerf::sweep

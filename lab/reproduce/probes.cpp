@@ -125,6 +125,36 @@ iso = 0.5
 shape = "ball"
 )";
 
+/// The scene of `kCutScene` with the settings and the lines of its tool that `figures` has.
+LoadedScene cut_scene(const Json& figures, double radius_mm) {
+  SceneOverrides overrides;
+  if (figures.contains("settings")) {
+    for (const auto& text : figures.at("settings").get<std::vector<std::string>>()) {
+      overrides.settings.push_back(parse_setting(text));
+    }
+  }
+  std::string text = kCutScene + ("radius_mm = " + number_text(radius_mm) + "\n");
+  if (figures.contains("tool")) {
+    for (const auto& line : figures.at("tool").get<std::vector<std::string>>()) text += line + '\n';
+  }
+  LoadedScene scene = load_scene("cut.toml", text, overrides);
+  scene.device.torque_scale = PlantParams().torque_scale();
+  scene.limits.continuous_force_n =
+      scene.limits.force_n;  // motors that get weaker would look like wear
+  return scene;
+}
+
+/// Leads the arm from the inkwell, which lies lower, around the solid to `y_mm` over it.
+void go_over_solid(AnyServo& servo, KinematicOmni& arm, double rate_hz, double y_mm) {
+  constexpr double kAboveMm = 30, kBesideMm = -60;
+  constexpr int kTravelTicks = 400;
+  arm_at(servo, arm, 0, kAboveMm, kBesideMm, std::max(1, static_cast<int>(rate_hz) / 1000));
+  for (int i = 1; i <= kTravelTicks; ++i) {
+    const double s = static_cast<double>(i) / kTravelTicks;
+    static_cast<void>(servo.step(arm.at(0, kAboveMm + s * (y_mm - kAboveMm), (1 - s) * kBesideMm)));
+  }
+}
+
 }  // namespace
 
 Json contact_energy(const Json& figures) {
@@ -176,34 +206,13 @@ Json cut_rate(const Json& figures) {
                  std::array{Figure{"press_n", 1, 0.05, 3}, Figure{"radius_mm", 0.5, 0.2, 2},
                             Figure{"seconds", 2, 0.1, 60}},
                  {"settings", "tool"});
-  SceneOverrides overrides;
-  if (figures.contains("settings")) {
-    for (const auto& text : figures.at("settings").get<std::vector<std::string>>()) {
-      overrides.settings.push_back(parse_setting(text));
-    }
-  }
-  std::string text = kCutScene + ("radius_mm = " + number_text(radius) + "\n");
-  if (figures.contains("tool")) {
-    for (const auto& line : figures.at("tool").get<std::vector<std::string>>()) text += line + '\n';
-  }
-  LoadedScene scene = load_scene("cut.toml", text, overrides);
-  scene.device.torque_scale = PlantParams().torque_scale();
-  scene.limits.continuous_force_n =
-      scene.limits.force_n;  // motors that get weaker would look like wear
+  LoadedScene scene = cut_scene(figures, radius);
   const auto h = scene.volumes[0].image.spacing_mm;
   const double mm3_per_step = h[0] * h[1] * h[2] / kDensityMax, rate_hz = scene.servo.rate_hz;
   const std::unique_ptr<AnyServo> servo = compile(scene);
   KinematicOmni arm;
   double y_mm = radius + 2;
-  // From the inkwell, which lies lower, around the solid and over it.
-  constexpr double kAboveMm = 30, kBesideMm = -60;
-  constexpr int kTravelTicks = 400;
-  arm_at(*servo, arm, 0, kAboveMm, kBesideMm, std::max(1, static_cast<int>(rate_hz) / 1000));
-  for (int i = 1; i <= kTravelTicks; ++i) {
-    const double s = static_cast<double>(i) / kTravelTicks;
-    static_cast<void>(
-        servo->step(arm.at(0, kAboveMm + s * (y_mm - kAboveMm), (1 - s) * kBesideMm)));
-  }
+  go_over_solid(*servo, arm, rate_hz, y_mm);
   // The hand sinks until its press is the wanted one: a fifth of the missing spring in each tick,
   // so that it follows the cut and does not swing; never faster than 50 mm/s.
   const double spring_n_per_mm = device_stiffness_n_per_mm(scene), most_mm = 50 / rate_hz;

@@ -174,6 +174,39 @@ class GuardedLoop {
   bool is_asked_to_end_ = false, has_ended_ = false;
 };
 
+/// The device as the controller reaches it: by its own link, or behind its maker's service.
+class ServedDevice {
+ public:
+  ServedDevice(FaultyDevice& device, bool by_service, std::uint32_t seed) : link_(&device) {
+#ifdef KERF_LAB_HAS_SERVICE
+    if (by_service) link_ = &service_.emplace(device, seed);
+#else
+    static_cast<void>(by_service);
+    static_cast<void>(seed);
+#endif
+  }
+  [[nodiscard]] PacketDevice& link() const noexcept {
+    return *link_;
+  }
+
+  /// Tells the contract what the service has failed to do up to now.
+  void tell(double time_ms, SafetyMonitor& contract) const {
+#ifdef KERF_LAB_HAS_SERVICE
+    if (service_ && service_->has_failed()) contract.service_fails(time_ms);
+    if (service_ && service_->has_left_pushing()) contract.service_left_pushing(time_ms);
+#else
+    static_cast<void>(time_ms);
+    static_cast<void>(contract);
+#endif
+  }
+
+ private:
+  PacketDevice* link_;
+#ifdef KERF_LAB_HAS_SERVICE
+  std::optional<ServiceLink> service_;
+#endif
+};
+
 double end_of(const FaultScript& script) {
   double end_s = 0;
   for (const DeviceFault& fault : script.faults) {
@@ -228,12 +261,8 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   LoadedScene scene = subject.scene;  // the servo takes its volumes
   Emulator emulator(model_of(subject, script.seed), subject.hand);
   FaultyDevice device(emulator, script);
-  PacketDevice* served = &device;
-#ifdef KERF_LAB_HAS_SERVICE
-  std::optional<ServiceLink> link;
-  if (subject.by_service) served = &link.emplace(device, script.seed);
-#endif
-  DirectPort wire(*served);
+  const ServedDevice served(device, subject.by_service, script.seed);
+  DirectPort wire(served.link());
 
   FaultOutcome outcome;
   const bool turns_fail =
@@ -259,10 +288,7 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     time_ms = static_cast<double>(cycle) * 1000 / kCyclesPerSecond;
     if (device.begun() > outcome.faults_begun) contract.fault_begins(time_ms);
     outcome.faults_begun = device.begun();
-#ifdef KERF_LAB_HAS_SERVICE
-    if (link && link->has_failed()) contract.service_fails(time_ms);
-    if (link && link->has_left_pushing()) contract.service_left_pushing(time_ms);
-#endif
+    served.tell(time_ms, contract);
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
     if (first_push_ms < 0 && outcome.pushed) {
       first_push_ms = time_ms;

@@ -264,6 +264,40 @@ bool ArmPageAdapter::has_controller() const noexcept {
 
 // The controller's side.
 
+namespace {
+
+/// Refuses the mapped page of a session if it has another layout, or is of another device.
+void check_session(std::byte* page, const std::string& path, const std::string& name,
+                   Personality device) {
+  using shared_words::word;
+  const auto found = word<std::uint32_t>(page + kAtDevice).load();
+  if (word(page + kAtMagic).load() != kMagic ||
+      word<std::uint32_t>(page + kAtLayout).load() != kLayout ||
+      found >= kPersonalityWords.size()) {
+    throw ArmPageError(path + ": of another version; start the kerf-arm of this one");
+  }
+  if (found == static_cast<std::uint32_t>(device)) return;
+  const std::string theirs(kPersonalityWords[found]);
+  throw ArmPageError("the kerf-arm named " + name + " is of a " + theirs +
+                     ", and the controller wants a " + std::string(word_of(device)) +
+                     "; take --device " + theirs + ", or another name");
+}
+
+/// Empties the places of commands: what a killed controller has left, be it half a command, must
+/// not outlive it.
+void empty_commands(std::byte* commands) noexcept {
+  const CommandRecord none;
+  for (std::size_t place = 0; place < kCommands; ++place) {
+    std::byte* const version = commands + place * kPlaceBytes;
+    const std::uint64_t odd = (shared_words::word(version).load() | 1) + 2;
+    shared_words::open(version, odd);
+    shared_words::store(version + 8, &none, sizeof none);
+    shared_words::close(version, odd + 1);
+  }
+}
+
+}  // namespace
+
 std::unique_ptr<ArmPageController> ArmPageController::open(const std::string& name,
                                                            Personality device, Absence& absence,
                                                            std::string& text) {
@@ -289,20 +323,7 @@ std::unique_ptr<ArmPageController> ArmPageController::open(const std::string& na
   page->session_ = word(page->at(kAtSession)).load();
   absence = Absence::starting;
   if (page->session_ == 0) return nullptr;
-  if (word(page->at(kAtMagic)).load() != kMagic ||
-      word<std::uint32_t>(page->at(kAtLayout)).load() != kLayout) {
-    throw ArmPageError(page->path_ + ": of another version; start the kerf-arm of this one");
-  }
-  if (const auto found = word<std::uint32_t>(page->at(kAtDevice)).load();
-      found != static_cast<std::uint32_t>(device)) {
-    if (found >= kPersonalityWords.size()) {
-      throw ArmPageError(page->path_ + ": of another version; start the kerf-arm of this one");
-    }
-    const std::string theirs(kPersonalityWords[found]);
-    throw ArmPageError("the kerf-arm named " + name + " is of a " + theirs +
-                       ", and the controller wants a " + std::string(word_of(device)) +
-                       "; take --device " + theirs + ", or another name");
-  }
+  check_session(page->at(0), page->path_, name, device);
   const ArmStatus now = page->status();
   text = now.text.data();
   if (now.state == ArmState::starting) return nullptr;
@@ -312,15 +333,7 @@ std::unique_ptr<ArmPageController> ArmPageController::open(const std::string& na
     throw ArmPageError("the kerf-arm named " + name +
                        " serves another controller; stop that one, or name another");
   }
-  // What a killed controller has left, be it half a command, must not outlive it.
-  const CommandRecord none;
-  for (std::size_t place = 0; place < kCommands; ++place) {
-    std::byte* const version = page->at(kAtCommands + place * kPlaceBytes);
-    const std::uint64_t odd = (word(version).load() | 1) + 2;
-    shared_words::open(version, odd);
-    shared_words::store(version + 8, &none, sizeof none);
-    shared_words::close(version, odd + 1);
-  }
+  empty_commands(page->at(kAtCommands));
   page->hello_ = {device, word<std::uint32_t>(page->at(kAtLockstep)).load() != 0,
                   static_cast<int>(word<std::uint32_t>(page->at(kAtRate)).load())};
   page->taken_ = word(page->at(kAtHead)).load(std::memory_order_acquire);

@@ -273,6 +273,20 @@ void keep_results(const VisualizerOptions& options, Session& session, Picture& p
   if (options.report) report.write(*options.report);
 }
 
+/// The report of a run that has drawn nothing yet, in the current context.
+FrameReport new_report(const VisualizerOptions& options, ContextKind context) {
+  return {.renderer = options.settings.renderer,
+          .gl_renderer = query_gl_driver().renderer,
+          .context = to_string(context),
+          .width = options.size.width,
+          .height = options.size.height};
+}
+
+/// A message on stderr that does not end the run.
+void say(const std::string& text) {
+  std::fprintf(stderr, "kerf-visualizer: %s\n", text.c_str());
+}
+
 }  // namespace
 
 int run_headless(const VisualizerOptions& asked) {
@@ -282,14 +296,8 @@ int run_headless(const VisualizerOptions& asked) {
   check_files(options);
   check_lead(options);
   const auto context = make_headless_context();
-  const GlDriver driver = query_gl_driver();
   take_default_renderer(options);
-  FrameReport report{.renderer = options.settings.renderer,
-                     .gl_renderer = driver.renderer,
-                     .context = to_string(context->kind()),
-                     .width = options.size.width,
-                     .height = options.size.height};
-
+  FrameReport report = new_report(options, context->kind());
   Session session = attach(options);
   report.attach_ms = session.attach_ms();
   const Stopwatch since_attached;
@@ -318,15 +326,13 @@ int run_headless(const VisualizerOptions& asked) {
     session.poll();
     picture.update(session);
     if (bodies) bodies->update(session);
-    if (const auto news = shared.step(picture.camera(), 0)) {
-      std::fprintf(stderr, "kerf-visualizer: %s\n", news->text.c_str());
-    }
+    if (const auto news = shared.step(picture.camera(), 0)) say(news->text);
     const auto ticks = session.ticks_since_armed();
     const bool filmed = film && ticks && film->due(session.servo_s());
     if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);
     if (filmed) {
       const auto problem = add_frame(film, taker.target(), session.servo_s());
-      if (problem) std::fprintf(stderr, "kerf-visualizer: %s\n", escaped(*problem).c_str());
+      if (problem) say(escaped(*problem));
     }
     while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
       const std::filesystem::path file = frame_file(options.out, schedule.take(ticks));

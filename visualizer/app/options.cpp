@@ -190,6 +190,34 @@ void declare_bench(Arguments& app, VisualizerOptions& o) {
       .needs(bench);
 }
 
+/// Refuses what only a window has, if there is none.
+void check_window(const VisualizerOptions& options) {
+  if (!options.headless && !options.bench) return;
+  const std::string without = options.headless ? "--headless" : "--bench";
+  if (options.hand_socket) {
+    throw VisualizerError("--hand-socket: " + without +
+                          " has no pointer that could lead a hand; give one of the two");
+  }
+  if (options.full_screen || options.monitor > 0) {
+    throw VisualizerError((options.full_screen ? "--full-screen: " : "--monitor: ") + without +
+                          " has no window; give one of the two");
+  }
+}
+
+/// Reads the words of the options, and the files that they name.
+void take_words(const Words& words, VisualizerOptions& options) {
+  options.size = parse_size(words.size);
+  options.panels = words.panels == "on";
+  check_renderers(options.settings.renderer);
+  if (words.aov) options.aov = aov_of(*words.aov, options.settings);
+  options.settings.gradient = gradient_named(words.gradient);
+  if (words.camera) {
+    options.settings.camera = read_camera(*words.camera);
+    if (is_camera_file(*words.camera)) options.camera_file = *words.camera;
+  }
+  if (options.transfer) options.settings.opacities = read_transfer(*options.transfer);
+}
+
 }  // namespace
 
 PictureSize parse_size(const std::string& text) {
@@ -255,29 +283,10 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   }
   if (record.given() && !frames.given() && !aov.given()) options.frames = 0;
   if (options.bench && !sized.given()) words.size = kBenchSize;
-  if (options.headless || options.bench) {
-    const std::string without = options.headless ? "--headless" : "--bench";
-    if (options.hand_socket) {
-      throw VisualizerError("--hand-socket: " + without +
-                            " has no pointer that could lead a hand; give one of the two");
-    }
-    if (options.full_screen || options.monitor > 0) {
-      throw VisualizerError((options.full_screen ? "--full-screen: " : "--monitor: ") + without +
-                            " has no window; give one of the two");
-    }
-  }
-  options.size = parse_size(words.size);
   options.size_is_given = sized.given();
-  options.panels = words.panels == "on";
   options.renderer_is_given = renderer.given();
-  check_renderers(options.settings.renderer);
-  if (words.aov) options.aov = aov_of(*words.aov, options.settings);
-  options.settings.gradient = gradient_named(words.gradient);
-  if (words.camera) {
-    options.settings.camera = read_camera(*words.camera);
-    if (is_camera_file(*words.camera)) options.camera_file = *words.camera;
-  }
-  if (options.transfer) options.settings.opacities = read_transfer(*options.transfer);
+  check_window(options);
+  take_words(words, options);
   return options;
 }
 

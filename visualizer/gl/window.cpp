@@ -15,8 +15,10 @@
 #include "visualizer/scene/visualizer_error.hpp"
 
 // A GLFW that is built for Wayland alone lacks them.
+// NOLINTBEGIN(readability-identifier-naming): the names are GLFW's.
 extern "C" __attribute__((weak)) Display* glfwGetX11Display();
 extern "C" __attribute__((weak)) ::Window glfwGetX11Window(GLFWwindow* handle);
+// NOLINTEND(readability-identifier-naming)
 
 namespace kerf {
 

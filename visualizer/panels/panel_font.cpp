@@ -6,13 +6,13 @@
 // The file as it is, 0.7 MB: C++20 has no other way to take it in that compiles within a second.
 asm(".pushsection .rodata\n"
     ".balign 16\n"
-    ".globl kerf_panel_font\n"
-    "kerf_panel_font: .incbin \"" KERF_PANEL_FONT
+    ".globl kPanelFont\n"
+    "kPanelFont: .incbin \"" KERF_PANEL_FONT
     "\"\n"
-    ".globl kerf_panel_font_end\n"
-    "kerf_panel_font_end: .byte 0\n"
+    ".globl kPanelFontEnd\n"
+    "kPanelFontEnd: .byte 0\n"
     ".popsection\n");
-extern "C" const unsigned char kerf_panel_font[], kerf_panel_font_end[];
+extern "C" const unsigned char kPanelFont[], kPanelFontEnd[];
 
 namespace kerf {
 
@@ -24,9 +24,9 @@ void load_panel_font(ImFontAtlas& fonts, float pixels) {
   config.PixelSnapH = true;                     // which no letter takes then
   fonts.Clear();
   // ImGui takes a pointer to what it may own, and does not write to it.
-  fonts.AddFontFromMemoryTTF(const_cast<unsigned char*>(kerf_panel_font),
-                             static_cast<int>(kerf_panel_font_end - kerf_panel_font), pixels,
-                             &config, kLatin.data());
+  fonts.AddFontFromMemoryTTF(const_cast<unsigned char*>(kPanelFont),
+                             static_cast<int>(kPanelFontEnd - kPanelFont), pixels, &config,
+                             kLatin.data());
 }
 
 }  // namespace kerf

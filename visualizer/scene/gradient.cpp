@@ -73,10 +73,10 @@ class Wanted {
   static Wanted all(const VoxelIndex& extent) { return Wanted(extent, {0, extent.x}); }
 
   [[nodiscard]] RowPart& row(std::int32_t y, std::int32_t z) noexcept {
-    return rows_[static_cast<std::size_t>(z * n.y + y)];
+    return rows_[VoxelGrid{1, n.y, n.z}.index(0, y, z)];
   }
   [[nodiscard]] const RowPart& row(std::int32_t y, std::int32_t z) const noexcept {
-    return rows_[static_cast<std::size_t>(z * n.y + y)];
+    return rows_[VoxelGrid{1, n.y, n.z}.index(0, y, z)];
   }
   /// What taps along y or z read for it, of a box that is larger by their reach at both ends.
   [[nodiscard]] Wanted read_along_y(std::int32_t reach) const { return read(reach, 0); }

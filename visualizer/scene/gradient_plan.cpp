@@ -101,9 +101,9 @@ FilterTaps voxel_taps(GradientFilter filter) {
 /// Standard deviation, in edges, of the smoothing whose derivative the slope is.
 double spread_of(const AxisTaps& taps) {
   double third = 0.0;
+  const float* const slope = taps.slope.data() + AxisTaps::kMiddle;
   for (std::int32_t i = -taps.reach; i <= taps.reach; ++i) {
-    const float slope = taps.slope[static_cast<std::size_t>(AxisTaps::kMiddle + i)];
-    third += static_cast<double>(i * i * i) * static_cast<double>(slope);
+    third += static_cast<double>(i * i * i) * static_cast<double>(slope[i]);
   }
   return std::sqrt(third / (3.0 * static_cast<double>(taps.slope_sum)));
 }
