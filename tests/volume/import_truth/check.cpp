@@ -164,11 +164,11 @@ std::string import_page() {
   std::ostringstream page;
   page
       << "## Which files are read\n\n"
-         "Each row is a situation in which a test writes numbered volumes: each voxel has its own "
-         "value and a known\nposition in the patient (LPS). *Read*: each voxel comes back with its "
-         "value and position. *Refused*: one line\ngives the reason, and nothing is read. *Asked*: "
-         "the line names the option that is missing. *Read or\nrefused*: some files of this kind "
-         "are read, others are refused. *First words*: how the line begins after\nthe file's "
+         "Each row is a situation. A test writes files for it, in which each voxel has its own "
+         "value and a known position\nin the patient (LPS). *Read*: each voxel comes back with its "
+         "value and position. *Refused*: one line gives the\nreason, and nothing is read. *Asked*: "
+         "the line names the option that is missing. *Read or refused*: some files\nof this kind "
+         "are read, others are refused. *First words*: how the line begins after the file's "
          "name.\n\nThe test "
          "writes the files byte by byte from the specifications of the formats "
          "(`tests/volume/import_truth`),\nin random sizes, spacings, orientations and types. "

@@ -329,7 +329,8 @@ constexpr SeriesRow kSeriesRows[] = {
        });
        v.values = kept;
      }},
-    {"tags of the display alone (MONOCHROME1, windows, VOI LUT, presentation LUT)", kRead, "",
+    {"tags that concern only the display (MONOCHROME1, windows, VOI LUT, presentation LUT)", kRead,
+     "",
      [](Series& f) {
        const int kind = f.draw.below(3);
        f.each([&](DataSet& set, int) {

@@ -442,7 +442,7 @@ constexpr Row kMetaRows[] = {
      }},
     {"CenterOfRotation that is not 0", kEither, "CenterOfRotation",
      [](TextFile& f) { before_data(f, "CenterOfRotation", "1 2 3"); }},
-    {"AnatomicalOrientation", kEither, "AnatomicalOrientation",
+    {"AnatomicalOrientation that does not fit the axes", kEither, "AnatomicalOrientation",
      [](TextFile& f) { before_data(f, "AnatomicalOrientation", f.draw.word("RAI|LPS|RAS")); }},
     {"fields that do not affect voxels (Modality, Comment, ElementMin)", kRead, "",
      [](TextFile& f) {
