@@ -24,9 +24,9 @@ MEANINGS = {
     "payload_bytes": "length of the payload as sent", "ring": "0 ticks, 1 dirty, 2 ticks of two arms", "count": "number of records",
     "first": "index of the first record", "stride": "difference between two indices", "sent_ns": "time when the frame was sent",
     "frame": "number of the frame that was applied", "argument": "argument of the command, listed above"}
-SAID = {"set_hash": "sum over all blocks that the viewer has after this frame, above",
+SAID = {"set_hash": "sum of `block_hash` over all blocks that the viewer has after this frame",
         "record_bytes": "size of a `TickRecord`", "dirty_bytes": "size of a `DirtyRecord`", "status": "listed above",
-        "index": "index of the command, which `last_command` will show", "kind": "listed above",
+        "index": "index of the command; the field `last_command` of a `TickRecord` will show it", "kind": "listed above",
         "hi": "end of the box (exclusive)",
         "removed": "density units removed; by an undo: given back"}
 

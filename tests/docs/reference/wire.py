@@ -56,8 +56,8 @@ packet. A packet with another value is refused.
 
 * 1 to 160 ahead: accepted.
 * 161 to 16,000 ahead: refused. If the next packet is 1 to 160 ahead of the refused one, it is accepted.
-* Any other counter is that of an old packet: refused. After 160 ticks without an accepted packet (the motors are then off) the
-  next packet is accepted here too if it is 1 to 160 ahead of the refused one.
+* Any other counter is that of an old packet: refused. One exception: after 160 ticks without an accepted packet (the motors are
+  then off), the next packet is accepted if it is 1 to 160 ahead of the refused one.
 
 **Counts to joints**, in rad, with c = 2 pi / {number('kCountsPerRev')}. `dock` is the count in the inkwell. q1 turns the turret to the left. q2 is the
 angle of the thigh above the horizontal. q3 is the angle of the forearm from straight down, outwards. All three angles are
@@ -195,7 +195,7 @@ or whose orientation has a length that differs from 1 by more than 1 %. The forc
 * `kerf-arm` sends the force that it passed to the vendor's library in the previous frame, which the device may not have exerted;
 * `kerf-arm` for the Inverse3 sends the force that the service reports. Before 3.5 the service reports none, so the force is 0.
 
-The servo rounds each axis of the position to a whole number of counts. *Parked* is how the user sets the bit `parked`.
+The servo rounds each axis of the position to a whole number of counts. The column *parked* shows how the user sets the bit `parked`.
 
 | device | one count of the servo, um | resolution, um | reports orientation | parked | workspace of the emulated device, mm | peak N, continuous N, slew N/ms |
 |---|---|---|---|---|---|---|
@@ -237,7 +237,8 @@ reads, and some others.
 * **Emulated versions** (`--profile`): {", ".join(f"`{word}`" for word in profiles)}. `kerf-arm` needs 3.1 or newer and refuses 3.0.
 * **HTTP**: `GET /version`, `/devices`, `/settings/devices/force_scale`. The emulator's reply to `/version` has a member
   `kerf_emulator`, from which `kerf-arm` reads whether the emulator runs in lock-step.
-* **Faults** (`--bus-fault`): {", ".join(f"`{word}`" for word in faults)}.
+* **Faults** of the emulated service (`--bus-fault SECONDS:KIND`). `hil/front/inverse3/service_device.hpp` describes each kind:
+  {", ".join(f"`{word}`" for word in faults)}.
 """
 
 
