@@ -59,7 +59,7 @@ gradients) and S (stability) with a number.
 | S1 to S6 | exact stability boundary of a sampled wall, with delay, filter, device and hand | the last digit of tabled values; 0.2 % for the plant of an Omni (S6) | `tests/stability/stable_gains_test.cpp` |
 | S7, S8 | damping at which a wall is passive, with filter and any delay | 1e-6 N s/m, with a filter 1e-5 N s/m | `tests/stability/passive_limits_test.cpp` |
 | S9 to S13 | the simulation of one axis finds the exact stability boundary; with friction and encoder steps it finds the 44 boundaries of another simulator | 2 %; 10 % | `tests/stability/one_axis_test.cpp`, `tests/lab/zwidth_test.cpp` |
-| S14 | the energy observer is the integral of force times velocity | 1e-9 J; the sum of the sources is exact to the last bit | `tests/servo/energy_ledger_test.cpp` |
+| S14 | the energy observer is the integral of force times velocity | 1e-9 J; the sum of its parts (docs/forces.md 5.5) is exact to the last bit | `tests/servo/energy_ledger_test.cpp` |
 | S15 | with the passivity controller a wall of 20 N/mm is stable under a push of 1 N | within 2 mm, energy by the observer at least -1e-9 J | `tests/servo/stabiliser_test.cpp` |
 | S17 | the difference of two encoder readings gives velocities only in multiples of D/T (D: encoder step, T: tick) | 1e-6 of D/T | `tests/stability/one_axis_test.cpp` |
 | S18 | error of the velocity estimator with encoder steps of 0.055 mm | 0.6 and 0.4 mm/s rms at 10 and 200 mm/s | `tests/servo/velocity_window_test.cpp` |
@@ -86,8 +86,8 @@ gradients) and S (stability) with a number.
 ### Where a promise is narrower than its words
 
 * F7: rotating tools penetrate deeper than a ball (`walls`).
-* F14: a sweep whose stamps lie between voxels removes up to 23 % more than the capsule. Its groove is at most 0.55 voxels
-  wider than the tool in radius.
+* F14: a sweep whose stamps lie between voxels removes up to 23 % more than the capsule. The radius of its groove is at
+  most 0.55 voxels larger than that of the tool.
 * S15: between two readings of the encoders the port itself may give 4.0 mJ (the test allows 10 mJ). No account of
   the energy observer contains this energy.
 * Open: of 10,000 random presses from `--seed 0` two stop cutting (scene 478, press 16; scene 483, press 0). In both the tool
@@ -103,10 +103,10 @@ COMPARED = """\
 
 ![Both forces on the same motions](%s)
 
-The paper's force does not stop a hand that presses on. The force grows with the contact area, here to %s N, and it is zero
-when the ball is wholly inside. Behind a wall of two voxels it pushes the hand onward. A hand that goes 3 mm deep meets no
-resistance along %s mm of its way in the thick wall, and along %s mm at the thin wall. The proxy stays in front of the
-wall, and its force grows with the depth of the hand.
+The paper's force does not stop a hand that presses on. The force grows with the contact area, here to %s N, and it is
+zero when the ball is wholly inside. Behind a wall of two voxels it pushes the hand onward. A hand that goes 3 mm deep
+meets no resistance along %s mm of its way in a wall of 5 mm, and along %s mm at a wall of two voxels. The proxy stays
+in front of the wall, and its force grows with the depth of the hand.
 
 The paper's force acts only in a zone near a face. A hand that moves across this zone in one tick can pass the face without
 any force, if the ticks fall just before and behind the zone. The table has the lowest speed at which this can happen. The
@@ -154,15 +154,15 @@ position. (The height and the normal of a ball are means of some fifty samples.)
 smooths the volume (`denoise = "auto"`, docs/theory.md 2.4). The rows with limits have this smoothing, the rows with `denoise
 off` do not.
 
-The rows `exact contact` are for comparison, on the surface without smoothing. They show the errors of a contact that takes
-no mean over samples. Its height is that of the tool when its first close sample touches the iso-surface. Its normal follows
-from such heights at positions half a voxel to each side."""),
+The rows `exact contact` are for comparison, on the surface without smoothing. They show the errors of a contact that
+takes no mean over samples. The tool is lowered until its first close sample touches the iso-surface: this gives the
+height of the contact. The normal follows from such heights at positions half a voxel to each side."""),
     ("edges", "Along and over sharp edges", """\
 The tool is a ball, or a cylinder whose side lies on the edge. The hand leads it along and over a sharp convex edge of 90
 degrees, two voxels below the position of rest, at 0.05 voxels a tick. The density of a voxel is the fraction of solid in
-a cube of two voxels, as in a scan. A ramp of the distance from the solid is not used here. Such a density has a ridge
-that voxels cannot represent. Its trilinear iso-surface is a row of bumps about a voxel apart, and the position nearest to
-the hand jumps from bump to bump."""),
+a cube of two voxels, as in a scan. The ramp of the other rows, which follows the distance from the solid, is not used
+here: at an edge it has a ridge that voxels cannot represent. Its trilinear iso-surface would be a row of bumps about a
+voxel apart, and the position nearest to the hand would jump from bump to bump."""),
     ("isos", "Low and high iso", """\
 Tools rest on flats of any tilt and on balls of R 14. The iso is from 0.02 to 0.95 of full density. The limit of the angle
 between force and normal is 1.5 times the angle at an iso of 0.45."""),
@@ -187,9 +187,11 @@ the force is above the threshold, volume must be removed.
   random. Three of eight scenes contain soft material; in half of these scenes the soft material may not be cut.
   Machinability is 1, 4 or 8 times that of enamel.
 * Three of four scenes run in fixed point at 1 kHz or 250 Hz, the others at 8 kHz or in double.
-* A press on shaft and head need not cut if the shaft alone can carry it: by forces along the normals of the contacts of its
-  cylinders. The part of a press that the shaft cannot carry is the load of the head, and must cut.
-* A solid that is softer than the iso everywhere must carry no load.
+* If shaft and head touch, a press need not cut if the shaft alone can carry it, that is, if forces along the normals of
+  the shaft's contacts can add up to the press. The part of a press that the shaft cannot carry is the load of the head,
+  and must cut.
+* A solid that is softer than the iso everywhere must carry no load (row *force in matter*: such solids have 0.2 to 0.97
+  of the density of the iso).
 
 A run has 240 presses, or 10,000 with `--only traps`. `--seed` is the number of the first scene."""),
     ("ticks", "Ticks", """\
@@ -199,8 +201,8 @@ tooth. The hand's positions are near the tool and far from it, and some ticks be
 costliest ticks are repeated from the same state, and the fastest repetition counts. The row names the solid at which the
 tick was found.
 
-Times are of the machine named above. The limits are for a processor with AVX-512. For a slower processor, compare with the
-paper's tick in this table."""),
+Times are of the machine named above. The limits are for a processor with AVX-512. On a slower processor, rows may miss
+their limits. The rows *paper* show the tick of the paper's force on the same processor, for comparison."""),
     ("hands", "Hands", """\
 An emulated Omni, its driver and the whole servo run in virtual time with `scenes/touch.toml`. The hands `groove` and
 `cut_cavity` have `[cut] model = "preston"`. *Force above 150 Hz* is the rms of this part of the force, over windows of 0.128
