@@ -38,7 +38,8 @@ A hand pushes with 1 N from 0.1 mm above a wall, and after 2 s it pulls back. Fi
 * `hand`: `bare` is the device alone, 0.045 kg and 0.2 N s/m; `gripped` is the device in a hand, 0.145 kg and 3.2 N s/m. The
   stabilisers know the figures of the device only.
 * `delay`: time from first contact until the force is half of the push (3000: never).
-* `depth`, `travel`: mean penetration and its peak-to-peak value in the last half second of the push.
+* `depth`, `travel`: mean penetration and its peak-to-peak value in the last half second of the push. A negative depth means
+  that the tip bounces, and is on average above the wall.
 * `drag`: largest force in air after the hand pulled back.
 * `minimum`: lowest energy of the port. The correction of `passivity` comes one tick late. So with a stiff wall the minimum
   may be lower with `passivity` than without a stabiliser, if the hand itself already damps the device.

@@ -86,8 +86,8 @@ A seed sets two things: the phase of the encoder steps relative to the wall, and
 phase alone changes the first K of one press by up to a factor of two. All columns use the same seeds, so two columns differ
 by their axes alone. `--seed` is the first seed, and `--seeds` the number of seeds, 5 by default.
 
-*One axis*, the default, runs the servo's own coupling, velocity estimator, stabilisers and force limits: the same
-templates, in the number type of the loop, with exact mechanics of the device. *Whole arm* (`--arm`) runs the servo step
+*One axis*, the default, runs the code of the servo's coupling, velocity estimator, stabilisers and force limits, in the
+number type of the loop, along one axis with exact mechanics of the device. *Whole arm* (`--arm`) runs the servo step
 with the emulated device, its driver and its packets in virtual time. The arm also slides onto the flat and hits the corner
 of three walls. It has one press of the sequence at each stiffness.
 
@@ -137,8 +137,8 @@ them.
 
 RATES = """\
 In the linear theory, without friction, the boundary grows in proportion to the rate. The measured boundary grows less, for
-two reasons. The encoder steps are the same at every rate. And at rates from 1 to 8 kHz the velocity window spans up to 16 ms: at
-a high rate this lag is more periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns
+two reasons. The encoder steps are the same at every rate. And at rates from 1 to 8 kHz the velocity window spans up to 16 ms. At
+a high rate this lag spans more periods, and the loop tolerates less damping than the linear boundary predicts. In grey columns
 the damping is unstable without any wall.
 
 """
@@ -148,7 +148,8 @@ KNOBS = """\
 
 The device is an Omni with B = 0.002 N s/mm and a delay of one period. One parameter changes at a time; the default is
 bold. K is in N/mm. The linear boundary includes mass, both dampings, delay, rate, hand and filter. *Re-entry* is the
-lowest stable K above the first crossing. Five seeds, 40 stiffnesses from 0.05 to 50 N/mm.
+lowest stable K above the first crossing. Five seeds, 40 stiffnesses from 0.05 to 50 N/mm. The rows of *filter* have the
+estimator `difference`, so the bold one has the K of `difference`.
 
 """
 
@@ -162,8 +163,8 @@ type is better in general.
 FILES = """\
 ## Files of a map
 
-`--csv` has one row for each cell: first the axes, in the order of `--help`, then the figures. A column without cells has no
-rows: it cannot exist, or the hand never met the wall.
+`--csv` has one row for each cell: first the axes, in the order of `--help`, then the figures. A column of the map, which
+is one combination of axis values, has no rows if it cannot exist, or if the hand never met the wall.
 
 | column | unit | meaning |
 |---|---|---|
@@ -209,6 +210,9 @@ another one.
 """
 
 ANSWER = """
+*swings* and *energy* are the first K that oscillates and the first K that is active, from the lowest to the highest of the
+seeds. *linear* is the boundary of the linear loop. *passive* is the highest K at which that loop is passive; 0: none.
+
 So this device may render {k} N/mm at B = {b} N s/mm: the lowest K divided by 1.5, as in the table of devices. The next command
 measures the same wall at several frequencies:
 
@@ -221,8 +225,8 @@ feels {port_k} N/mm and {port_b} N s/mm, because the inertia of the device count
 with negative damping the hand gets energy, unless its own damping takes more.
 
 The line *furthest from theory* has the largest deviation of all rows. The theory assumes the estimator `difference` and no
-stabiliser. The last line has two dampings: the one from which on device and wall would be passive with any hand, and the one
-that the device has.
+stabiliser. The last line has two dampings. With the first damping or more in the device, device and wall would be passive with any
+hand. The second is the damping that the device has.
 
 `--estimator difference` gives the wall of the theory. `--arm` measures the whole servo step with an emulated device. `--log
 DIR` measures the wall from a recording ([log](log.md)). For such a recording move your hand to and fro in the wall, faster
@@ -475,9 +479,9 @@ def page(data, devices, rates):
                            f"**{row['value']}**" if row["standard"] else row["value"], first(row["swings"]),
                            first(row["active"]), text.figure(row["exact"]),
                            text.figure(row["re_entry"]) if row["re_entry"] > 0 else "-"] for row in data["knobs"]])
-            + "\n## Fixed point and double\n\n"
+            + "\n## Fixed point and double\n\nA map of the Omni, with dampings from 0 to 0.03 N s/mm, was made in each number type:\n\n"
             + "".join(f"* {row['numeric']} point and double: {row['others']} of {row['cells']} cells oscillate in only one of the two. "
-                      f"The first crossing\n  differs in {row['columns']} columns, by a factor of at most {row['factor']:.3g}.\n"
+                      f"The first crossing (the lowest K that oscillates)\n  differs in {row['columns']} columns, by a factor of at most {row['factor']:.3g}.\n"
                       for row in data["numbers"])
             + NUMBERS + question(data["question"]) + HOW + FILES + data["provenance"] + "\n")
 
