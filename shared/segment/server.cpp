@@ -6,7 +6,9 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <thread>
@@ -32,19 +34,23 @@
 namespace kerf {
 namespace {
 
-/// The socket at `path` to which readers connect; the destructor removes the path.
+/// The socket at `path`, NAME.sock, to which readers connect; the destructor removes the path.
+/// Until it listens, it is NAME.new: a reader that finds NAME.sock is not refused in between.
 class Listener {
  public:
   explicit Listener(std::string path) : path_(std::move(path)) {
-    const sockaddr_un address = unix_address(path_);
-    unlink(path_.c_str());  // left by a dead controller: we hold the name lock
+    const std::string unborn = std::filesystem::path(path_).replace_extension(".new");
+    const sockaddr_un address = unix_address(unborn);
+    unlink(unborn.c_str());  // left by a dead controller: we hold the name lock
     fd_ = OwnedFd(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() creates the file with these rights
     if (fd_.get() < 0 || fchmod(fd_.get(), kOwnerAlone) != 0 ||
         bind(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        listen(fd_.get(), SOMAXCONN) != 0) {
-      throw SegmentError(path_ + ": " + system_message(errno) + "; " +
-                         remedy_for(errno, "make the folder writable"));
+        listen(fd_.get(), SOMAXCONN) != 0 || rename(unborn.c_str(), path_.c_str()) != 0) {
+      const int error = errno;
+      unlink(unborn.c_str());
+      throw SegmentError(path_ + ": " + system_message(error) + "; " +
+                         remedy_for(error, "make the folder writable"));
     }
   }
   ~Listener() { unlink(path_.c_str()); }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
@@ -7,6 +9,7 @@
 #include <future>
 #include <limits>
 #include <string>
+#include <thread>
 
 #include <doctest/doctest.h>
 #include <fcntl.h>
@@ -16,6 +19,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shared/posix/sockets.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/server.hpp"
 #include "shared/volume/checksum.hpp"
@@ -160,6 +164,33 @@ TEST_CASE("the socket that a killed controller left is replaced") {
   CHECK(writer.session_id() != connection.reader().info().session_id);
   close(ready[0]);
   close(ready[1]);
+}
+
+TEST_CASE("a reader that finds the socket is never refused, however early it comes") {
+  const RuntimeFolder folder;
+  NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const sockaddr_un address = unix_address(segment_socket("demo"));
+  int refused = 0;
+  for (int i = 0; i < 500; ++i) {
+    std::atomic<bool> looks{false};
+    auto early = std::async(std::launch::async, [&] {
+      for (;;) {
+        const OwnedFd fd(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+        const int failed =
+            connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
+        looks = true;
+        if (failed == 0) return 0;
+        if (errno != ENOENT) return errno;
+      }
+    });
+    while (!looks) std::this_thread::yield();
+    const SegmentServer server("demo", writer);
+    refused += early.get() == 0 ? 0 : 1;
+  }
+  CHECK(refused == 0);
+  CHECK_FALSE(std::filesystem::exists(
+      std::filesystem::path(segment_socket("demo")).replace_extension(".new")));
 }
 
 TEST_CASE("a client that is stopped and continued while it waits for the greeting gets it") {
