@@ -388,7 +388,7 @@ void look_at_scene(const ControllerOptions& options) {
   check_gains(options, second, gain_margin(second));
 }
 
-/// A driver at each port, begun.
+/// Makes a driver for each port and starts it.
 std::vector<std::unique_ptr<DeviceDriver>> start_drivers(const LoadedScene& scene,
                                                          RunStart& start) {
   std::vector<std::unique_ptr<DeviceDriver>> drivers;
@@ -401,7 +401,8 @@ std::vector<std::unique_ptr<DeviceDriver>> start_drivers(const LoadedScene& scen
   return drivers;
 }
 
-/// For a run in real time; `report` has what this process may not do.
+/// Locks the memory of a run in real time. Writes missing rights to `report`; throws if `--strict`
+/// forbids them.
 void take_rights(const ControllerOptions& options, const SegmentWriter& segment,
                  RunReport& report) {
   report.missing_rights = lock_memory();
@@ -411,8 +412,8 @@ void take_rights(const ControllerOptions& options, const SegmentWriter& segment,
   accept_rights(report.missing_rights, options.real_time.strict);
 }
 
-/// Faults and late forces, each with its way out, as warnings.
-void tell_of_faults(const RunStart& start, const RunReport& report) {
+/// Warns of faults and of late or refused forces, with the remedy.
+void warn_of_faults(const RunStart& start, const RunReport& report) {
   const LoadedScene& scene = start.planned.scene;
   for (std::size_t arm = 0; arm < start.ports.size(); ++arm) {
     const EventList& faults = report.record.arm(arm).faults;
@@ -423,7 +424,7 @@ void tell_of_faults(const RunStart& start, const RunReport& report) {
   if (start.external) tell_of_forces(*start.external, scene.force.stale_ms);
 }
 
-/// What the scene's volumes, its tools and the links have come to.
+/// Writes removal, tools, link counters and the hash of the volumes to `report`.
 void report_results(const RunStart& start, const Devices& devices, RunReport& report) {
   const LoadedScene& scene = start.planned.scene;
   const CompiledScene& servo = *start.planned.servo;
@@ -467,7 +468,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
   segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
   report.end = text_of(end);
-  tell_of_faults(start, report);
+  warn_of_faults(start, report);
   report_results(start, devices, report);
   if (const std::int64_t first_ns = report.record.first_force_ns; first_ns > 0) {
     report.start_to_force_ms = static_cast<double>(first_ns - began_ns) / 1e6;

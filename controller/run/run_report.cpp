@@ -165,7 +165,7 @@ std::string second_lines(const ArmReport& arm, const ArmRecord& r) {
          lines("fault", r.faults) + "\n";
 }
 
-Json rights_of(const std::vector<MissingRight>& rights) {
+Json missing_rights_json(const std::vector<MissingRight>& rights) {
   Json list = Json::List{};
   for (const MissingRight& right : rights) {
     list.push_back({{"what", right.what}, {"effect", right.effect}});
@@ -225,7 +225,7 @@ std::string report_json(const RunReport& report) {
       {"lost_packets", report.lost_packets},
       {"refused_packets", report.refused_packets},
       {"link", json_of(report.link)},
-      {"missing_rights", rights_of(report.missing_rights)},
+      {"missing_rights", missing_rights_json(report.missing_rights)},
       {"load_s", report.load_s},
       {"start_to_force_ms", report.start_to_force_ms},
       {"volume_hash", hex64(report.volume_hash)},

@@ -353,9 +353,10 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
     if (t.law != BurLaw{}) {
       const auto or_none = [](double value) { return value > 0 ? number_text(value) : "none"; };
       std::printf(
-          "bur_law=%s force_exponent=%g speed_exponent=%g saturation_n=%s wear_half_n_s=%s\n",
-          t.name.c_str(), t.law.force_exponent, t.law.speed_exponent,
-          or_none(t.law.saturation_n).c_str(), or_none(t.law.wear_half_n_s).c_str());
+          "bur_law=%s force_exponent=%s speed_exponent=%s saturation_n=%s wear_half_n_s=%s\n",
+          t.name.c_str(), number_text(t.law.force_exponent).c_str(),
+          number_text(t.law.speed_exponent).c_str(), or_none(t.law.saturation_n).c_str(),
+          or_none(t.law.wear_half_n_s).c_str());
     }
     const std::string note = t.mesh.triangles.empty() ? "" : mesh_note(t.mesh);
     if (!note.empty()) std::printf("note=tool %s: %s\n", t.name.c_str(), note.c_str());

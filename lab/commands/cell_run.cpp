@@ -283,7 +283,9 @@ CellResult result_of(int exit, const std::filesystem::path& folder, const std::s
   return result;
 }
 
-std::vector<std::string> controller(const CellJob& job, const std::filesystem::path& folder) {
+/// Command line of the controller of a cell.
+std::vector<std::string> controller_command(const CellJob& job,
+                                            const std::filesystem::path& folder) {
   const auto at = [&](const char* name) { return (folder / name).string(); };
   std::vector<std::string> words{program_beside("controller"), "--scene", job.scene};
   for (const std::string& setting : job.settings) {
@@ -301,8 +303,8 @@ std::vector<std::string> controller(const CellJob& job, const std::filesystem::p
   return words;
 }
 
-/// The emulator that the controller has asked for in the file `told`.
-std::vector<std::string> emulator_as_told(const CellJob& job, const std::filesystem::path& folder) {
+/// Command line of the emulator, with the settings that the controller wrote to the file `told`.
+std::vector<std::string> emulator_command(const CellJob& job, const std::filesystem::path& folder) {
   Lines told = lines_of(text_in(folder / "told"));
   std::string& hand = told["hand_script"];
   if (hand.empty()) hand = find_data_file("scenes/hands/cut_cavity.toml");  // as the demo
@@ -352,29 +354,31 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   // A word that is no device's is refused by the programs.
   const Personality personality = personality_of(device_of(job)).value_or(Personality{});
   TickFollower ticks(job.name, folder / "until", personality);
-  Child servo(controller(job, folder), folder / "controller");
+  Child controller(controller_command(job, folder), folder / "controller");
   while (!std::filesystem::exists(folder / "told")) {
     if (stop) return std::nullopt;
-    if (const auto code = servo.ended()) return result_of(*code, folder, servo.last_line());
+    if (const auto code = controller.ended()) {
+      return result_of(*code, folder, controller.last_line());
+    }
     std::this_thread::sleep_for(kLook);
   }
-  Child device(emulator_as_told(job, folder), folder / "emulator");
+  Child device(emulator_command(job, folder), folder / "emulator");
   const auto end = Clock::now() + kLongestRun;
-  while (!servo.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {
+  while (!controller.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {
     if (stop) return std::nullopt;
     ticks.poll();
     std::this_thread::sleep_for(kLook);
   }
   ticks.poll();
-  if (!servo.ended()) {
+  if (!controller.ended()) {
     const auto refused = device.ended();
-    servo.signal(SIGKILL);
+    controller.signal(SIGKILL);
     return result_of(
         refused.value_or(2), folder,
         refused ? device.last_line() : "kerf-controller: no end after 30 minutes; killed");
   }
   if (!end_of(device, stop, kGrace)) return std::nullopt;
-  return result_of(*servo.ended(), folder, servo.last_line(), ticks.swing());
+  return result_of(*controller.ended(), folder, controller.last_line(), ticks.swing());
 }
 
 }  // namespace kerf::sweep

@@ -190,7 +190,7 @@ the force is above the threshold, volume must be removed.
 * If shaft and head touch, a press need not cut if the shaft alone can carry it, that is, if forces along the normals of
   the shaft's contacts can add up to the press. The part of a press that the shaft cannot carry is the load of the head,
   and must cut.
-* A solid that is softer than the iso everywhere must carry no load (row *force in matter*: such solids have 0.2 to 0.97
+* A solid that is softer than the iso everywhere must carry no load (row *force in solids*: such solids have 0.2 to 0.97
   of the density of the iso).
 
 A run has 240 presses, or 10,000 with `--only traps`. `--seed` is the number of the first scene."""),

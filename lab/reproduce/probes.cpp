@@ -125,7 +125,7 @@ iso = 0.5
 shape = "ball"
 )";
 
-/// The scene of `kCutScene` with the settings and the lines of its tool that `figures` has.
+/// `kCutScene` with a ball of this radius, and the settings and tool lines of `figures`.
 LoadedScene cut_scene(const Json& figures, double radius_mm) {
   SceneOverrides overrides;
   if (figures.contains("settings")) {
@@ -144,7 +144,8 @@ LoadedScene cut_scene(const Json& figures, double radius_mm) {
   return scene;
 }
 
-/// Leads the arm from the inkwell, which lies lower, around the solid to `y_mm` over it.
+/// Moves the arm from the inkwell around the solid to the height `y_mm` above it. The inkwell is
+/// lower than the solid.
 void go_over_solid(AnyServo& servo, KinematicOmni& arm, double rate_hz, double y_mm) {
   constexpr double kAboveMm = 30, kBesideMm = -60;
   constexpr int kTravelTicks = 400;

@@ -185,12 +185,15 @@ class ServedDevice {
     static_cast<void>(seed);
 #endif
   }
+  ServedDevice(const ServedDevice&) = delete;
+  ServedDevice& operator=(const ServedDevice&) = delete;
+
   [[nodiscard]] PacketDevice& link() const noexcept {
     return *link_;
   }
 
-  /// Tells the contract what the service has failed to do up to now.
-  void tell(double time_ms, SafetyMonitor& contract) const {
+  /// Reports failures of the service to the contract.
+  void report(double time_ms, SafetyMonitor& contract) const {
 #ifdef KERF_LAB_HAS_SERVICE
     if (service_ && service_->has_failed()) contract.service_fails(time_ms);
     if (service_ && service_->has_left_pushing()) contract.service_left_pushing(time_ms);
@@ -288,7 +291,7 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     time_ms = static_cast<double>(cycle) * 1000 / kCyclesPerSecond;
     if (device.begun() > outcome.faults_begun) contract.fault_begins(time_ms);
     outcome.faults_begun = device.begun();
-    served.tell(time_ms, contract);
+    served.report(time_ms, contract);
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
     if (first_push_ms < 0 && outcome.pushed) {
       first_push_ms = time_ms;

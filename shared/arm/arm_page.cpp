@@ -266,7 +266,7 @@ bool ArmPageAdapter::has_controller() const noexcept {
 
 namespace {
 
-/// Refuses the mapped page of a session if it has another layout, or is of another device.
+/// Throws ArmPageError if the page has another layout or belongs to another device.
 void check_session(std::byte* page, const std::string& path, const std::string& name,
                    Personality device) {
   using shared_words::word;
@@ -283,8 +283,7 @@ void check_session(std::byte* page, const std::string& path, const std::string& 
                      "; take --device " + theirs + ", or another name");
 }
 
-/// Empties the places of commands: what a killed controller has left, be it half a command, must
-/// not outlive it.
+/// Clears all commands, also half-written ones, that a killed controller left.
 void empty_commands(std::byte* commands) noexcept {
   const CommandRecord none;
   for (std::size_t place = 0; place < kCommands; ++place) {

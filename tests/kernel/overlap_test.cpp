@@ -166,33 +166,43 @@ TEST_CASE("the memory sized for a tool is enough in any orientation, at any pitc
   }));
 }
 
-TEST_CASE(
-    "in a volume smaller than the tool the memory is the volume's and its rim's, and enough") {
-  std::size_t full = 0;
-  CHECK(property([&] {
+TEST_CASE_TEMPLATE("the memory is enough in any volume, and no more than the volume and its rim", N,
+                   FixedNumbers, DoubleNumbers) {
+  CHECK(property([] {
     const auto seed = any<std::uint32_t>();
     std::mt19937 random(seed);
     const auto within = [&](double low, double high) {
       return std::uniform_real_distribution<double>(low, high)(random);
     };
-    const auto voxels = [&] { return 1 + static_cast<std::int32_t>(random() % 5); };
+    const auto voxels = [&] {
+      return 1 + static_cast<std::int32_t>(random() % (random() % 2 == 0 ? 4 : 30));
+    };
     const VoxelGrid grid{voxels(), voxels(), voxels()};
+    const std::array<double, 3> spacing{within(1, 3), within(1, 3), within(1, 3)};
     const auto tool = paper_ball(11);
     auto pose =
-        turned_pose({within(-3, grid.nx + 3), within(-3, grid.ny + 3), within(-3, grid.nz + 3)},
-                    {within(-1, 1), within(-1, 1), within(-1, 1), 1.1});
-    std::vector<std::int32_t> memory(overlap_capacity(grid, {11, 11, 11}, 1, {1, 1, 1}));
+        turned_pose<N>({within(-3, grid.nx + 3), within(-3, grid.ny + 3), within(-3, grid.nz + 3)},
+                       {within(-1, 1), within(-1, 1), within(-1, 1), 1.1});
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (auto& step : pose.step[a]) {
+        step = static_cast<typename N::Step>(static_cast<double>(step) / spacing[a]);
+      }
+    }
+    std::vector<typename N::Weight> memory(overlap_capacity(grid, {11, 11, 11}, 1, spacing));
     HOLDS(memory.size() <= VoxelGrid{grid.nx + 2, grid.ny + 2, grid.nz + 2}.voxel_count());
-    OverlapBox<FixedNumbers> box{memory, {}, 0};
+    OverlapBox<N> box{memory, {}, 0};
     const bool touches = std::ranges::any_of(tool, [&](const ToolOffset& offset) {
-      return cell_at<FixedNumbers>(sample_position(pose, offset)).touches(grid);
+      return cell_at<N>(sample_position(pose, offset)).touches(grid);
     });
-    static_cast<void>(overlap(grid, tool, pose, FixedNumbers::kStepOne, box));
+    static_cast<void>(overlap(grid, tool, pose, N::kStepOne, box));
     HOLDS(box.box.empty() != touches);
-    const VoxelIndex size = box.box.extent();
-    full += VoxelGrid{size.x, size.y, size.z}.voxel_count() == memory.size() ? 1 : 0;
   }));
-  CHECK(full > 10);  // the bound is reached
+  const VoxelGrid inside_tool{3, 4, 5};
+  std::vector<typename N::Weight> memory(overlap_capacity(inside_tool, {11, 11, 11}, 1, {1, 1, 1}));
+  OverlapBox<N> box{memory, {}, 0};
+  overlap(inside_tool, paper_ball(11), pose_at<N>({1.3, 1.8, 2.4}), N::kStepOne, box);
+  CHECK(box.box == VoxelBox{{-1, -1, -1}, {4, 5, 6}});
+  CHECK(memory.size() == 5 * 6 * 7);  // the bound is reached
 }
 
 TEST_CASE("a box too large for its memory, a far tool and an empty one cover nothing") {

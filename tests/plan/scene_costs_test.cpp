@@ -407,6 +407,30 @@ TEST_CASE(
   CHECK(highest_rate_hz(2001) == 0);  // 249.9 Hz are not offered
 }
 
+TEST_CASE("the overlap box of two volumes has room for the larger one, and no more") {
+  const auto bytes_of = [](std::initializer_list<int> edges) {
+    LoadedScene scene = half_space_scene(32);
+    scene.tools = {shape("cone", 1, 3)};
+    scene.cut.model = CutModel::overlap;
+    scene.servo.numeric = NumericKind::float64;
+    scene.force.model = ForceModel::paper;
+    scene.volumes.clear();
+    for (const int edge : edges) {
+      scene.volumes.push_back(full_block(edge));
+      scene.volumes.back().name = "block " + std::to_string(edge);
+    }
+    const auto planned = plan_scene(scene);
+    for (const ArrayBytes& array : planned->costs().arrays) {
+      if (array.name == "overlap box") return array.bytes;
+    }
+    return std::uint64_t{0};
+  };
+  CHECK(bytes_of({4}) == 6 * 6 * 6 * sizeof(double));  // the volume and a voxel around it
+  CHECK(bytes_of({4, 8}) == bytes_of({8}));
+  CHECK(bytes_of({8, 4}) == bytes_of({8}));
+  CHECK(bytes_of({64, 128}) == bytes_of({64}));  // wider than the tool
+}
+
 TEST_CASE("a scene holds the arrays that it names, and no others") {
   using Names = std::set<std::string>;
   const auto arrays_of = [](LoadedScene scene) { return names(compile(scene)->costs().arrays); };

@@ -284,19 +284,23 @@ TEST_CASE("--probe without a port says what is there, with one that is silent it
   CHECK(probe.wait() == 1);
 }
 
-TEST_CASE("--check names the law by which a bur with a grit cuts, and no law of one without") {
+TEST_CASE(
+    "--check prints the law of a bur that does not follow Preston's law, and of no other bur") {
   const TemporaryFolder folder;
   const std::string scene = (folder / "scene.toml").string();
   std::ofstream(scene)
       << "[[volume]]\nfile = \"phantom\"\n"
          "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nname = \"plain\"\n"
          "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nname = \"rough\"\ngrit = \"medium\"\n"
+         "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nname = \"worn\"\ngrit = \"coarse\"\n"
          "[cut]\nmodel = \"preston\"\n";
   Process check({kBin + "/kerf-controller", "--scene", scene, "--check"}, folder / "log");
   CHECK(check.wait() == 0);
   const std::string said = check.output();
   CHECK(said.find("bur_law=rough force_exponent=1 speed_exponent=0 saturation_n=0.98 "
                   "wear_half_n_s=110\n") != std::string::npos);
+  CHECK(said.find("bur_law=worn force_exponent=1 speed_exponent=0 saturation_n=none "
+                  "wear_half_n_s=170\n") != std::string::npos);
   CHECK(said.find("bur_law=plain") == std::string::npos);
 }
 

@@ -190,7 +190,7 @@ void declare_bench(Arguments& app, VisualizerOptions& o) {
       .needs(bench);
 }
 
-/// Refuses what only a window has, if there is none.
+/// Throws if an option needs a window and the run has none.
 void check_window(const VisualizerOptions& options) {
   if (!options.headless && !options.bench) return;
   const std::string without = options.headless ? "--headless" : "--bench";

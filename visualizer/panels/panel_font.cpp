@@ -6,13 +6,14 @@
 // The file as it is, 0.7 MB: C++20 has no other way to take it in that compiles within a second.
 asm(".pushsection .rodata\n"
     ".balign 16\n"
-    ".globl kPanelFont\n"
-    "kPanelFont: .incbin \"" KERF_PANEL_FONT
+    ".globl kerf_panel_font\n"
+    "kerf_panel_font: .incbin \"" KERF_PANEL_FONT
     "\"\n"
-    ".globl kPanelFontEnd\n"
-    "kPanelFontEnd: .byte 0\n"
+    ".globl kerf_panel_font_end\n"
+    "kerf_panel_font_end: .byte 0\n"
     ".popsection\n");
-extern "C" const unsigned char kPanelFont[], kPanelFontEnd[];
+extern "C" const unsigned char kPanelFont[] asm("kerf_panel_font"), kPanelFontEnd[] asm(
+                                                                        "kerf_panel_font_end");
 
 namespace kerf {
 

@@ -72,11 +72,9 @@ class Wanted {
       : n(extent), rows_(VoxelGrid{1, n.y, n.z}.voxel_count(), each) {}
   static Wanted all(const VoxelIndex& extent) { return Wanted(extent, {0, extent.x}); }
 
-  [[nodiscard]] RowPart& row(std::int32_t y, std::int32_t z) noexcept {
-    return rows_[VoxelGrid{1, n.y, n.z}.index(0, y, z)];
-  }
+  [[nodiscard]] RowPart& row(std::int32_t y, std::int32_t z) noexcept { return rows_[at(y, z)]; }
   [[nodiscard]] const RowPart& row(std::int32_t y, std::int32_t z) const noexcept {
-    return rows_[VoxelGrid{1, n.y, n.z}.index(0, y, z)];
+    return rows_[at(y, z)];
   }
   /// What taps along y or z read for it, of a box that is larger by their reach at both ends.
   [[nodiscard]] Wanted read_along_y(std::int32_t reach) const { return read(reach, 0); }
@@ -85,6 +83,10 @@ class Wanted {
   const VoxelIndex n;
 
  private:
+  [[nodiscard]] std::size_t at(std::int32_t y, std::int32_t z) const noexcept {
+    return static_cast<std::size_t>(z) * static_cast<std::size_t>(n.y) +
+           static_cast<std::size_t>(y);
+  }
   [[nodiscard]] Wanted read(std::int32_t along_y, std::int32_t along_z) const {
     Wanted more({n.x, n.y + 2 * along_y, n.z + 2 * along_z});
     for_each_voxel({{0, 0, 0}, {1, n.y, n.z}}, [&](int, int y, int z) {

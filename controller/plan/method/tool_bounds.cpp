@@ -129,6 +129,12 @@ double maximum(Function f) {
   return f((low + high) / 2);
 }
 
+/// Voxels of the volume along each axis that a tool reaches whose samples lie in so many cells.
+VoxelGrid reached(const VoxelIndex& cells, const VoxelGrid& grid) {
+  return {std::min(cells.x + 1, grid.nx), std::min(cells.y + 1, grid.ny),
+          std::min(cells.z + 1, grid.nz)};
+}
+
 /// Visits the bits of covered voxels for each row of the overlap, word by word.
 template <class Visit>
 void each_covered_word(const AlignedTable& table, Visit&& visit) {
@@ -186,7 +192,7 @@ std::vector<VoxelIndex> box_sizes(const SceneTool& tool, const SceneVolume& volu
 std::size_t max_covered_voxels(const SceneTool& tool, const SceneVolume& volume) {
   std::size_t by_box = 0;
   for (const VoxelIndex& size : box_sizes(tool, volume)) {
-    by_box = std::max(by_box, VoxelGrid{size.x + 1, size.y + 1, size.z + 1}.voxel_count());
+    by_box = std::max(by_box, reached(size, volume.image.grid).voxel_count());
   }
   const auto& h = volume.image.spacing_mm;
   const double by_hull = GrownHull(tool, volume).volume(1.0 / 3) / (h[0] * h[1] * h[2]);
@@ -196,8 +202,9 @@ std::size_t max_covered_voxels(const SceneTool& tool, const SceneVolume& volume)
 std::size_t max_cover_groups(const SceneTool& tool, const SceneVolume& volume) {
   std::size_t by_box = 0;
   for (const VoxelIndex& size : box_sizes(tool, volume)) {
-    const std::int32_t in_row = size.x / kCoverGroup + 1;
-    by_box = std::max(by_box, VoxelGrid{in_row, size.y + 1, size.z + 1}.voxel_count());
+    VoxelGrid groups = reached(size, volume.image.grid);
+    groups.nx = (groups.nx + kCoverGroup - 1) / kCoverGroup;
+    by_box = std::max(by_box, groups.voxel_count());
   }
   constexpr double kGroup = kCoverGroup;
   const auto& h = volume.image.spacing_mm;

@@ -30,8 +30,8 @@ namespace kerf {
 /// samples' hull, grown by that box, over a cell's. The hull is taken for a cylinder K about the
 /// tool's axis, and grown by boxes of edge b it has
 /// V(K) + b SUM A_i + b^2 SUM w_i + b^3, A_i and w_i its shadow and its width along the axes, at
-/// their largest for any direction of K's axis. The box around the tool is another bound; the
-/// smaller one counts.
+/// their largest for any direction of K's axis. The box around the tool is another bound, as
+/// far as the volume goes; the smaller one counts.
 [[nodiscard]] std::size_t max_covered_voxels(const SceneTool& tool, const SceneVolume& volume);
 
 /// Most groups of kCoverGroup neighbours that contain those voxels. From the table of a tool of the

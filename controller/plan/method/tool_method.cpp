@@ -190,9 +190,9 @@ TickShape tick_shape(const ToolCase& in, const AlignedTable* table) {
 }
 
 std::size_t max_cover_entries(const ToolCase& in, const AlignedTable* table) {
-  if (table != nullptr) return max_cover_groups(*table);
-  const bool fixed = in.scene.servo.numeric == NumericKind::fixed;
-  return fixed ? max_cover_groups(in.tool, in.volume) : max_covered_voxels(in.tool, in.volume);
+  if (in.scene.servo.numeric != NumericKind::fixed) return max_covered_voxels(in.tool, in.volume);
+  const std::size_t groups = max_cover_groups(in.tool, in.volume);
+  return table == nullptr ? groups : std::min(groups, max_cover_groups(*table));
 }
 
 std::vector<StageCost> tick_stages(const ToolMethod& method, const TickShape& shape, VoxelIndex box,

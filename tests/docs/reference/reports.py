@@ -9,7 +9,7 @@ SPREAD = "`p50`, `p99`, `p999`, `max`"
 # of its own, or stands in `inner`.
 REPORTS = [
     ("Controller: a run", "`./kerf controller --report FILE`, and `report.json` of a demo.",
-     [("controller/run/run_report.cpp", name) for name in ("std::string report_json(", "Json percentiles(", "Json list(", "Json rights_of(")],
+     [("controller/run/run_report.cpp", name) for name in ("std::string report_json(", "Json percentiles(", "Json list(", "Json missing_rights_json(")],
      ["p50", "p99", "p999", "max", "tick", "name", "what", "effect"], [
         ("program, version", "", "kerf-controller and its version"),
         ("scene, device, numeric", "", "file of the scene; device and number type of the loop, empty if the scene was not loaded"),

@@ -444,7 +444,7 @@ void measure_traps(const Effort& effort, const RowSink& add_row) {
   const Search soft = search(
       effort.presses / 4, effort.first_scene, kSoftS, kSoftN, "N", {}, soft_scene,
       [](const Pressed& seen) { return seen.held_n; }, add_row);
-  row("force in matter of 0.2 to 0.97 of the iso", soft.worst, "N", kSoftN, 0);
+  row("force in solids of 0.2 to 0.97 of the iso", soft.worst, "N", kSoftN, 0);
 }
 
 }  // namespace kerf::extremes
