@@ -68,7 +68,7 @@ bool OmniArm::within_limits(JointVec<double> q) const noexcept {
   const double elbow = q.z - q.y;
   return std::abs(q.x) <= stops_.turret_rad && q.y >= stops_.thigh_min_rad &&
          q.y <= stops_.thigh_max_rad && elbow >= stops_.elbow_min_rad &&
-         elbow <= stops_.elbow_max_rad;
+         elbow <= stops_.elbow_max_rad && q.z <= stops_.forearm_max_rad;
 }
 
 bool OmniArm::stop_at_limits(JointVec<double>& q, DeviceVec<double>& tip_mm,
@@ -85,11 +85,15 @@ bool OmniArm::stop_at_limits(JointVec<double>& q, DeviceVec<double>& tip_mm,
     return side;
   };
   double elbow = q.z - q.y;
-  const std::array<Stop, 3> stops{
-      {{{1, 0, 0}, clamp(q.x, -stops_.turret_rad, stops_.turret_rad)},
-       {{0, 1, 0}, clamp(q.y, stops_.thigh_min_rad, stops_.thigh_max_rad)},
-       {{0, -1, 1}, clamp(elbow, stops_.elbow_min_rad, stops_.elbow_max_rad)}}};
+  const int turret_side = clamp(q.x, -stops_.turret_rad, stops_.turret_rad);
+  const int thigh_side = clamp(q.y, stops_.thigh_min_rad, stops_.thigh_max_rad);
+  const int elbow_side = clamp(elbow, stops_.elbow_min_rad, stops_.elbow_max_rad);
   q.z = q.y + elbow;
+  const int forearm_side = clamp(q.z, -omni::kPi, stops_.forearm_max_rad);
+  const std::array<Stop, 4> stops{{{{1, 0, 0}, turret_side},
+                                   {{0, 1, 0}, thigh_side},
+                                   {{0, -1, 1}, elbow_side},
+                                   {{0, 0, 1}, forearm_side}}};
   tip_mm = this->tip_mm(q);
   for (const Stop& stop : stops) {
     if (stop.side == 0) continue;

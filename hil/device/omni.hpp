@@ -22,12 +22,17 @@ struct OmniLinks {
 };
 
 /// Its mechanical end stops, rad; the elbow's angle is q3 - q2.
+///
+/// That of the forearm is ours. Where the thigh's and the elbow's last stops meet, the arm is
+/// stretched up and the tip is 5 mm behind the turret's axis: no turning of the turret leads there,
+/// and on the axis no torque balances a force on the tip. With it the tip stays 10 mm in front.
 struct OmniStops {
   double turret_rad = 0.98;  ///< to both sides
   double thigh_min_rad = 0.0;
   double thigh_max_rad = 1.75;
   double elbow_min_rad = -0.81;
   double elbow_max_rad = 1.25;
+  double forearm_max_rad = 2.88;
 };
 
 /// The emulator's kinematics of the Omni: double precision, elbow up, written from the geometry and

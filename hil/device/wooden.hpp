@@ -16,8 +16,9 @@ namespace kerf {
 /// The emulator's kinematics of the WoodenHaptics arm: the Omni's two links with other lengths and
 /// other names of the angles (A = -q1, B = pi/2 - q2, C = q3).
 ///
-/// The end stops are ours: turret +-1.0, B -0.35..1.35, and the angle between the links (B + C)
-/// 0.45..2.6 rad, which keeps the arm away from its folded and its stretched pose.
+/// The end stops are ours: turret +-1.0, B -0.35..1.35, the angle between the links (B + C)
+/// 0.45..2.6 rad, which keeps the arm away from its folded and its stretched pose, and C up to 2.8,
+/// which keeps the tip 8 mm in front of the turret's axis (OmniStops).
 class WoodenArm {
  public:
   [[nodiscard]] DeviceVec<double> tip_mm(JointVec<double> q) const noexcept {
@@ -64,7 +65,8 @@ class WoodenArm {
                   .thigh_min_rad = kQuarter - 1.35,
                   .thigh_max_rad = kQuarter + 0.35,
                   .elbow_min_rad = 0.45 - kQuarter,
-                  .elbow_max_rad = 2.6 - kQuarter}};
+                  .elbow_max_rad = 2.6 - kQuarter,
+                  .forearm_max_rad = 2.8}};
 };
 
 /// One WoodenHaptics arm (plans of 2015) and one hand. A count is a mA.

@@ -117,7 +117,7 @@ NameLock::NameLock(std::string_view name)
     file_ = OwnedFd(open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
     if (file_.get() < 0) {
       throw SegmentError(path_ + ": " + system_message(errno) + "; " +
-                         remedy_for(errno, "make the folder writable"));
+                         remedy_for(errno, "remove what is there, or make the folder writable"));
     }
     if (flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
       std::array<char, 24> holder{};

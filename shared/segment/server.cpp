@@ -50,7 +50,7 @@ class Listener {
       const int error = errno;
       unlink(unborn.c_str());
       throw SegmentError(path_ + ": " + system_message(error) + "; " +
-                         remedy_for(error, "make the folder writable"));
+                         remedy_for(error, "remove what is there, or make the folder writable"));
     }
   }
   ~Listener() { unlink(path_.c_str()); }

@@ -60,7 +60,7 @@ NOT_HERE = {
         "./kerf lab reproduce"],
     "needs network namespaces; the test bridge_net does the same": ["./kerf demo --two-machines"],
     "names a program or an option, and is no whole command": [
-        "./kerf controller$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
+        "./kerf controller$", "./kerf controller --check$", "./kerf demo --name$", "./kerf demo --volume$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
         "./kerf controller --rate HZ$", "./kerf controller --port udp:HOST:5000$", "./kerf controller --report FILE$",
         "./kerf controller --explain --report FILE$", "./kerf record info LOG", "./kerf replay$", "./kerf identify$"],
     "needs a recording of a device that a program has moved; the tests identify and lab run it": ["./kerf identify", "./kerf lab zwidth --device device.toml", "./kerf controller --scene scenes/touch.toml --set 'device.identified"],
@@ -68,7 +68,8 @@ NOT_HERE = {
 }
 # What stands for a reader's own file, within text.
 OWN = (("import PATH", "import ct/ --out own.nrrd"), ("info FILE", "info tooth.nrrd"), ("--volume FILE", "--volume tooth.nrrd"),
-       ("--report FILE", "--report own.json"), ("DIR", "own"))
+       ("--report FILE", "--report own.json"), ("DIR", "own"),
+       ("--rate HZ", "--rate 8000"))
 EVERYWHERE = ("examples", "hil", "python", "scenes", "tests")
 # `./kerf` of a scratch folder: a page's own --seconds give way.
 DOOR = """#!/bin/bash
@@ -155,7 +156,7 @@ def run_page(page, root, bin_folder):
         environment.pop("DISPLAY", None)
         environment.pop("WAYLAND_DISPLAY", None)
         furnish(folder, root, bin_folder)
-        if page.name == "stand-ins.md":  # a scene that its reader has
+        if page.name in ("contact.md", "stand-ins.md"):  # a scene that its reader has
             shutil.copy(root / "scenes" / "touch.toml", folder / "mine.toml")
             os.symlink(root / "scenes" / "hands", folder / "hands")
         for number, command, expected in todo:

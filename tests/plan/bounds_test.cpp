@@ -37,9 +37,7 @@ TEST_CASE("a tool covers no more voxels than it is said to, in any pose and any 
       std::vector<double> memory(std::size_t{50} * 50 * 50);
       std::size_t most = 0;
       for (int i = 0; i < 400; ++i) {
-        ToolPose<DoubleNumbers> pose;
-        pose.centre_vox = {edge / 2.0 + i % 7 * 0.13, edge / 2.0 + i % 11 * 0.09, edge / 2.0};
-        pose.step = random_turn();
+        ToolPose<DoubleNumbers> pose = turned_in_block(edge, i);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           for (double& step : pose.step[axis]) step *= kVoxelMm / block.image.spacing_mm[axis];
         }
@@ -75,13 +73,7 @@ TEST_CASE("a tool covers no more groups than it is said to, in any pose") {
       std::vector<CoveredGroup> list(10'000);
       std::size_t most = 0;
       for (int i = 0; i < 400; ++i) {
-        ToolPose<FixedNumbers> pose;
-        pose.centre_vox = {Q16(edge / 2.0 + i % 7 * 0.13), Q16(edge / 2.0 + i % 11 * 0.09),
-                           Q16(edge / 2.0)};
-        const Matrix turn = random_turn();
-        for (std::size_t a = 0; a < 3; ++a) {
-          for (std::size_t b = 0; b < 3; ++b) pose.step[a][b] = step_of<FixedNumbers>(turn[a][b]);
-        }
+        const ToolPose<FixedNumbers> pose = rounded(turned_in_block(edge, i));
         const SplatTick tick(kScalarSet, samples.table(), kExactFarid, memory.view(),
                              block.image.grid, block.image.density, pose);
         tick.copy();

@@ -53,4 +53,20 @@ inline Matrix random_turn() {
   return matrix_of(q);
 }
 
+/// Pose `i` of many: any turn, about the middle of a block of `edge` voxels and not on its lattice.
+inline ToolPose<DoubleNumbers> turned_in_block(int edge, int i) {
+  ToolPose<DoubleNumbers> pose;
+  pose.centre_vox = {edge / 2.0 + i % 7 * 0.13, edge / 2.0 + i % 11 * 0.09, edge / 2.0};
+  pose.step = random_turn();
+  return pose;
+}
+inline ToolPose<FixedNumbers> rounded(const ToolPose<DoubleNumbers>& exact) {
+  ToolPose<FixedNumbers> pose;
+  pose.centre_vox = {Q16(exact.centre_vox.x), Q16(exact.centre_vox.y), Q16(exact.centre_vox.z)};
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t b = 0; b < 3; ++b) pose.step[a][b] = step_of<FixedNumbers>(exact.step[a][b]);
+  }
+  return pose;
+}
+
 }  // namespace kerf::test

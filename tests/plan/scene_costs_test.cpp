@@ -168,13 +168,7 @@ TEST_CASE("a splatting tick does no more than it is said to, in any pose and any
       const std::array loops{"copy", "press", "bend", "cut"};
       std::array<std::uint64_t, 4> most{};
       for (int i = 0; i < 2000; ++i) {
-        ToolPose<FixedNumbers> pose;
-        pose.centre_vox = {Q16(edge / 2.0 + i % 7 * 0.13), Q16(edge / 2.0 + i % 11 * 0.09),
-                           Q16(edge / 2.0)};
-        const Matrix turn = random_turn();
-        for (std::size_t a = 0; a < 3; ++a) {
-          for (std::size_t b = 0; b < 3; ++b) pose.step[a][b] = step_of<FixedNumbers>(turn[a][b]);
-        }
+        const ToolPose<FixedNumbers> pose = rounded(turned_in_block(edge, i));
         const SplatTick tick(kScalarSet, samples.table(), kExactFarid, scratch, block.image.grid,
                              block.image.density, pose);
         const TickBox& box = tick.box();
@@ -215,9 +209,7 @@ TEST_CASE("a gathering tick that cuts works on no more voxels than it is said to
       std::vector<double> memory(std::size_t{50} * 50 * 50);
       std::uint64_t overlapped = 0, cut = 0, refreshed = 0;
       for (int i = 0; i < 3000; ++i) {
-        ToolPose<DoubleNumbers> pose;
-        pose.centre_vox = {edge / 2.0 + i % 7 * 0.13, edge / 2.0 + i % 11 * 0.09, edge / 2.0};
-        pose.step = random_turn();
+        const ToolPose<DoubleNumbers> pose = turned_in_block(edge, i);
         OverlapBox<DoubleNumbers> box{memory, {}, 0};
         const VoxelBox inside =
             overlap<DoubleNumbers>(block.image.grid, tool.offsets, pose, 1, box);
