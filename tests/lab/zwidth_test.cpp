@@ -84,6 +84,12 @@ bool swings(const LoopCase& subject, double stiffness, bool by_energy = false) {
   return by_energy ? swing.active : swing.swings;
 }
 
+/// How many random presses a test makes: KERF_PRESSES, of `.ci/all ranges`, or so many.
+int presses_or(int standard) {
+  const char* const wanted = std::getenv("KERF_PRESSES");
+  return wanted != nullptr ? std::atoi(wanted) : standard;
+}
+
 constexpr const char* kSmall =
     "zwidth --damping 0,0.002,0.02 --stiffness 0.2:0.4:6 --seeds 2 --delay 0,1 ";
 
@@ -779,7 +785,7 @@ TEST_CASE("a search over presses finds no more than any press, given or random, 
       return lowest + (highest - lowest) * static_cast<double>(random() >> 11) * 0x1p-53;
     };
     StepCounter ticks;
-    for (int i = 0; i < 1000; ++i) {
+    for (int i = 0; i < presses_or(1000); ++i) {
       const Press press{any(0.05, 2.97), any(0, 500), any(0, 2)};
       CAPTURE(press.push_n);
       CAPTURE(press.hit_mm_per_s);
@@ -799,8 +805,7 @@ TEST_CASE("a press of the sequence finds what lies beside no standard press") {
 }
 
 TEST_CASE("on the emulated devices the safe stiffnesses of docs/stability.md bear any press") {
-  const char* const wanted = std::getenv("KERF_PRESSES");
-  const int presses = wanted != nullptr ? std::atoi(wanted) : 20;
+  const int presses = presses_or(20);
   std::ifstream page(std::string(KERF_DOCS) + "/stability.md");
   const std::regex row(R"(\| (\w+) \| (\d) \| ([\d.]+) \|(?:[^|]*\|){4} ([\d.]+) \| [^|]* \|)");
   std::mt19937_64 random(23);
