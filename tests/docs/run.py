@@ -48,7 +48,7 @@ NOT_HERE = {
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [
         "./kerf test", "safety.md: ./kerf lab", "./kerf studies ranges", ".ci/check-determinism.sh", ".ci/check-bare-metal.sh", "./kerf bench",
-        "KERF_KILLS=", "KERF_WRITE_PAGE=", "./kerf studies ablate"],
+        "KERF_KILLS=", "KERF_WRITE_PAGE="],
     "holds a core for a minute; with other options it runs here or in the tests lab and examples_python": [
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
         "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab zwidth --merge", "./kerf sweep"],
