@@ -36,7 +36,7 @@ inline std::string unique_name() {
 
 /// Waits for a controller that worked in real time. It ended well with 0; or with 1, if a busy
 /// machine stopped its emulator or its servo so long that a fault is due (docs/safety.md: 20 ms
-/// without a report are stale_input, a fast hand after 10 ms or more is overspeed).
+/// without a report are stale_input, a hand that moved 10 mm in a gap is overspeed).
 [[nodiscard]] inline bool ended_well(Process& controller, const std::filesystem::path& path) {
   const int code = controller.wait();
   if (code != 1) return code == 0;
