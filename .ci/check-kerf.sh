@@ -462,6 +462,21 @@ printf '#!/bin/sh\n' | tee "$lab/tools/ninja" >"$lab/tree/.ci/packages.sh"
 # It knows three tests: one prints $GUEST and is skipped if that is a reason, of two a part is skipped for $PART, if anything.
 cat >"$lab/tools/ctest" <<'PROGRAM'
 #!/usr/bin/env bash
+case "$*" in
+  *' --rerun-failed -N -L '*)
+    if [[ -n ${TIMED:-} ]]; then printf '  Test #7: %s\n' $TIMED; fi
+    exit 0
+    ;;
+  *' --rerun-failed -N -LE '*)
+    if [[ -n ${OTHER:-} ]]; then printf '  Test #8: %s\n' $OTHER; fi
+    exit 0
+    ;;
+  *--rerun-failed*)
+    echo again >>"$LAB/tries"
+    echo 'skipped: at another try' >build/release/Testing/Temporary/LastTest.log
+    exit "$AGAIN"
+    ;;
+esac
 echo "$*" >"$LAB/ctest"
 mkdir -p build/release/Testing/Temporary
 {
@@ -505,6 +520,15 @@ expect 'a test that is skipped without a word' tests_give 0 'skipped:' 0
 expect 'has a line too' ends_with 'kerf: test: hil_guest was skipped: its output does not say why'
 expect 'with a guest' tests_give 0 '[doctest] Status: SUCCESS!' 0
 expect 'nothing is said' ends_with ''
+expect 'a test that keeps time and passes at another try' with TIMED='hil_fuse demo' with AGAIN=0 tests_give 0 '' 8
+expect 'is named with it' ends_with 'kerf: test: passed at a second or third try: hil_fuse demo'
+expect 'one try of ctest' test "$(wc -l <"$lab/tries")" == 1
+expect 'the outputs of both are kept' test "$(grep -c 'Test: load\|at another try' "$lab/tree/build/release/Testing/Temporary/LastTest.log")" == 2
+expect 'one that fails again' with TIMED=hil_fuse with AGAIN=8 tests_give 1 '' 8
+expect 'is named alone' ends_with 'kerf: test: these failed, and they keep time; they try again: hil_fuse'
+rm "$lab/tries"
+expect 'one beside a test that does not keep time' with TIMED=hil_fuse with OTHER=scene with AGAIN=0 tests_give 1 '' 8
+expect 'does not try again' test ! -e "$lab/tries"
 
 echo "check-kerf: $checks checks, $failures failed"
 ((failures == 0))

@@ -16,6 +16,16 @@
 #include "shared/wire/woodenhaptics.hpp"
 
 namespace kerf::faults {
+
+/// Counts, angles and motors of a device. Not in the namespace without a name: g++ 14.2 crashes at
+/// a pointer to a function that returns such a type if another file includes this one (unity
+/// build).
+struct WireUnits {
+  std::array<double, 3> zero_rad{}, rad_per_count{}, nmm_per_count{};
+  int count_end = 0;
+  EncoderCounts dock_count{};
+};
+
 namespace {
 
 constexpr int kHomePoseCounts = 40;  // WoodenHaptics: the home pose, as a hand holds it
@@ -25,16 +35,9 @@ bool counts_are_set(const std::array<std::int16_t, 3>& count) {
   return count != std::array<std::int16_t, 3>{};
 }
 
-/// Counts, angles and motors of a device.
-struct Units {
-  std::array<double, 3> zero_rad{}, rad_per_count{}, nmm_per_count{};
-  int count_end = 0;
-  EncoderCounts dock_count{};
-};
-
-Units omni_units(Personality, const std::array<double, 3>& dock_rad) {
+WireUnits omni_units(Personality, const std::array<double, 3>& dock_rad) {
   const OmniParams unit;
-  Units units{dock_rad, {}, unit.torque_nmm_per_count, omni::kMotorCountMax};
+  WireUnits units{dock_rad, {}, unit.torque_nmm_per_count, omni::kMotorCountMax};
   std::ranges::transform(unit.encoder_offset, units.dock_count.begin(),
                          [](int count) { return static_cast<std::int16_t>(count); });
   for (std::size_t i = 0; i < 3; ++i) {
@@ -43,22 +46,22 @@ Units omni_units(Personality, const std::array<double, 3>& dock_rad) {
   return units;
 }
 
-Units falcon_units(Personality, const std::array<double, 3>&) {
-  Units units{{}, {}, FalconParams().torque_nmm_per_count, falcon::kMotorCountMax};
+WireUnits falcon_units(Personality, const std::array<double, 3>&) {
+  WireUnits units{{}, {}, FalconParams().torque_nmm_per_count, falcon::kMotorCountMax};
   units.zero_rad.fill(falcon::kZeroRad);
   units.rad_per_count.fill(falcon::kRadPerCount);
   return units;
 }
 
-Units wooden_units(Personality, const std::array<double, 3>&) {
+WireUnits wooden_units(Personality, const std::array<double, 3>&) {
   return {{}, wooden::kRadPerCount, WoodenParams().torque_nmm_per_count, wooden::kMaxMilliamps};
 }
 
-Units cartesian_units(Personality personality, const std::array<double, 3>&) {
-  Units units{{},
-              {},
-              CartesianParams(personality).torque_nmm_per_count,
-              static_cast<int>(force_figures(personality).peak_n * 1000)};
+WireUnits cartesian_units(Personality personality, const std::array<double, 3>&) {
+  WireUnits units{{},
+                  {},
+                  CartesianParams(personality).torque_nmm_per_count,
+                  static_cast<int>(force_figures(personality).peak_n * 1000)};
   units.rad_per_count.fill(cartesian::figures(personality)->step_um / 1000.0);
   return units;
 }
@@ -92,7 +95,7 @@ DeviceVec<double> axes_force_of(const ArmPose&, const JointVec<double>& force_n)
 
 struct DeviceWire::Kind {
   Personality personality;
-  Units (*units)(Personality, const std::array<double, 3>& dock_rad);
+  WireUnits (*units)(Personality, const std::array<double, 3>& dock_rad);
   std::optional<ObservedReport> (DeviceWire::*report)(Packet, bool may_count_anew);
   std::optional<ObservedCommand> (DeviceWire::*command)(Packet);
   std::optional<DeviceVec<double>> (*tip_mm)(const JointVec<double>&);
@@ -117,7 +120,7 @@ constexpr std::array<DeviceWire::Kind, kDeviceKinds.size()> DeviceWire::kinds() 
 
 DeviceWire::DeviceWire(Personality personality, const std::array<double, 3>& dock_rad)
     : device_(kerf::kind_of(personality)), kind_(kind_of(personality)) {
-  const Units units = kind_.units(personality, dock_rad);
+  const WireUnits units = kind_.units(personality, dock_rad);
   zero_rad_ = units.zero_rad;
   rad_per_count_ = units.rad_per_count;
   nmm_per_count_ = units.nmm_per_count;

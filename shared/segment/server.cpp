@@ -46,12 +46,10 @@ class Listener {
     constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() creates the file with these rights
     if (fd_.get() < 0 || fchmod(fd_.get(), kOwnerAlone) != 0 ||
         bind(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        listen(fd_.get(), SOMAXCONN) != 0 || rename(unborn.c_str(), path_.c_str()) != 0) {
-      const int error = errno;
-      unlink(unborn.c_str());
-      throw SegmentError(path_ + ": " + system_message(error) + "; " +
-                         remedy_for(error, "remove what is there, or make the folder writable"));
+        listen(fd_.get(), SOMAXCONN) != 0) {
+      fail(unborn, unborn);
     }
+    if (rename(unborn.c_str(), path_.c_str()) != 0) fail(path_, unborn);
   }
   ~Listener() { unlink(path_.c_str()); }
   Listener(const Listener&) = delete;
@@ -60,6 +58,13 @@ class Listener {
   [[nodiscard]] int get() const noexcept { return fd_.get(); }
 
  private:
+  [[noreturn]] static void fail(const std::string& place, const std::string& unborn) {
+    const int error = errno;
+    unlink(unborn.c_str());
+    throw SegmentError(place + ": " + system_message(error) + "; " +
+                       remedy_for(error, "remove what is there, or make the folder writable"));
+  }
+
   std::string path_;
   OwnedFd fd_;
 };
