@@ -469,6 +469,7 @@ case "$*" in
     ;;
   *' --rerun-failed -N -LE '*)
     if [[ -n ${OTHER:-} ]]; then printf '  Test #8: %s\n' $OTHER; fi
+    if [[ ! -e build/release/Testing/Temporary/LastTestsFailed.log ]]; then echo '  Test #9: load'; fi  # all that there are
     exit 0
     ;;
   *--rerun-failed*)
@@ -479,6 +480,7 @@ case "$*" in
 esac
 echo "$*" >"$LAB/ctest"
 mkdir -p build/release/Testing/Temporary
+if ((CTEST)) && [[ -z ${NONE:-} ]]; then touch build/release/Testing/Temporary/LastTestsFailed.log; fi
 {
   printf '1/3 Testing: hil_guest\n1/3 Test: hil_guest\n%s\n' "$GUEST"
   for name in load kills; do printf '2/3 Testing: %s\n2/3 Test: %s\n%s\n' "$name" "$name" "${PART:-[doctest] skipped: 0}"; done
@@ -529,6 +531,8 @@ expect 'is named alone' ends_with 'kerf: test: these failed, and they keep time;
 rm "$lab/tries"
 expect 'one beside a test that does not keep time' with TIMED=hil_fuse with OTHER=scene with AGAIN=0 tests_give 1 '' 8
 expect 'does not try again' test ! -e "$lab/tries"
+expect 'no test of that name, after a run in which one failed' with NONE=yes with TIMED=hil_fuse with AGAIN=0 tests_give 1 '' 8
+expect 'nothing tries again' test ! -e "$lab/tries"
 
 echo "check-kerf: $checks checks, $failures failed"
 ((failures == 0))

@@ -10,7 +10,7 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 build=build/$1 status=0
 outputs=$build/Testing/Temporary/LastTest.log said=$build/Testing/tests.log
 mkdir -p "$build/Testing"
-rm -f "$outputs" "$said"
+rm -f "$outputs" "$said" "$build/Testing/Temporary/LastTestsFailed.log"  # if no test matches, ctest leaves an old list
 # One more at once than there are cores: some of them wait most of the time.
 ctest --preset "$1" --parallel $(($(nproc) + 1)) --no-tests=error --output-log "$PWD/$said" "${@:2}" || status=1
 
