@@ -463,24 +463,19 @@ printf '#!/bin/sh\n' | tee "$lab/tools/ninja" >"$lab/tree/.ci/packages.sh"
 cat >"$lab/tools/ctest" <<'PROGRAM'
 #!/usr/bin/env bash
 case "$*" in
-  *' --rerun-failed -N -L '*)
-    if [[ -n ${TIMED:-} ]]; then printf '  Test #7: %s\n' $TIMED; fi
+  *' -N -L '*)
+    printf '  Test #7: %s\n' hil_fuse demo
     exit 0
     ;;
-  *' --rerun-failed -N -LE '*)
-    if [[ -n ${OTHER:-} ]]; then printf '  Test #8: %s\n' $OTHER; fi
-    if [[ ! -e build/release/Testing/Temporary/LastTestsFailed.log ]]; then echo '  Test #9: load'; fi  # all that there are
-    exit 0
-    ;;
-  *--rerun-failed*)
-    echo again >>"$LAB/tries"
+  *' -R ^'*)
+    echo "$*" >>"$LAB/tries"
     echo 'skipped: at another try' >build/release/Testing/Temporary/LastTest.log
     exit "$AGAIN"
     ;;
 esac
 echo "$*" >"$LAB/ctest"
 mkdir -p build/release/Testing/Temporary
-if ((CTEST)) && [[ -z ${NONE:-} ]]; then touch build/release/Testing/Temporary/LastTestsFailed.log; fi
+if [[ -n ${FAILED:-} ]]; then printf '47:%s\n' $FAILED >build/release/Testing/Temporary/LastTestsFailed.log; fi
 {
   printf '1/3 Testing: hil_guest\n1/3 Test: hil_guest\n%s\n' "$GUEST"
   for name in load kills; do printf '2/3 Testing: %s\n2/3 Test: %s\n%s\n' "$name" "$name" "${PART:-[doctest] skipped: 0}"; done
@@ -522,16 +517,16 @@ expect 'a test that is skipped without a word' tests_give 0 'skipped:' 0
 expect 'has a line too' ends_with 'kerf: test: hil_guest was skipped: its output does not say why'
 expect 'with a guest' tests_give 0 '[doctest] Status: SUCCESS!' 0
 expect 'nothing is said' ends_with ''
-expect 'a test that keeps time and passes at another try' with TIMED='hil_fuse demo' with AGAIN=0 tests_give 0 '' 8
-expect 'is named with it' ends_with 'kerf: test: passed at a second or third try: hil_fuse demo'
-expect 'one try of ctest' test "$(wc -l <"$lab/tries")" == 1
+expect 'tests that keep time and pass at another try' with FAILED='hil_fuse demo' with AGAIN=0 tests_give 0 '' 8
+expect 'are named with it' ends_with 'kerf: test: passed at a second or third try: hil_fuse demo'
+expect 'they alone try again' grep -qF -- '-R ^(hil_fuse|demo)$ ' "$lab/tries"
 expect 'the outputs of both are kept' test "$(grep -c 'Test: load\|at another try' "$lab/tree/build/release/Testing/Temporary/LastTest.log")" == 2
-expect 'one that fails again' with TIMED=hil_fuse with AGAIN=8 tests_give 1 '' 8
-expect 'is named alone' ends_with 'kerf: test: these failed, and they keep time; they try again: hil_fuse'
+expect 'one that fails again' with FAILED=hil_fuse with AGAIN=8 tests_give 1 '' 8
+expect 'is named once' ends_with 'kerf: test: these failed, and they keep time; they try again: hil_fuse'
 rm "$lab/tries"
-expect 'one beside a test that does not keep time' with TIMED=hil_fuse with OTHER=scene with AGAIN=0 tests_give 1 '' 8
+expect 'one beside a test that does not keep time' with FAILED='hil_fuse hil' with AGAIN=0 tests_give 1 '' 8
 expect 'does not try again' test ! -e "$lab/tries"
-expect 'no test of that name, after a run in which one failed' with NONE=yes with TIMED=hil_fuse with AGAIN=0 tests_give 1 '' 8
+expect 'no test of that name, after a run in which one failed' with AGAIN=0 tests_give 1 '' 8
 expect 'nothing tries again' test ! -e "$lab/tries"
 
 echo "check-kerf: $checks checks, $failures failed"

@@ -8,9 +8,9 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 build=build/$1 status=0
-outputs=$build/Testing/Temporary/LastTest.log said=$build/Testing/tests.log
+outputs=$build/Testing/Temporary/LastTest.log said=$build/Testing/tests.log failures=$build/Testing/Temporary/LastTestsFailed.log
 mkdir -p "$build/Testing"
-rm -f "$outputs" "$said" "$build/Testing/Temporary/LastTestsFailed.log"  # if no test matches, ctest leaves an old list
+rm -f "$outputs" "$said" "$failures"  # if no test matches, ctest leaves an old list
 # One more at once than there are cores: some of them wait most of the time.
 ctest --preset "$1" --parallel $(($(nproc) + 1)) --no-tests=error --output-log "$PWD/$said" "${@:2}" || status=1
 
@@ -32,15 +32,15 @@ awk '
     for (test in whole) if (!(test in told)) print "kerf: test: " test " was skipped: its output does not say why"
   }' "$said" "$outputs" >&2
 
-keeps_time='realtime|hil-fuse'
-failed() { ctest --preset "$1" --rerun-failed -N "${@:2}" | sed -n 's/^ *Test *#[0-9]*: //p'; }
-if ((status)) && [[ " $* " != *' --output-junit '* && " $* " != *' --repeat '* ]]; then
-  again=$(failed "$1" -L "$keeps_time" | paste -sd ' ')
-  if [[ -n $again && -z $(failed "$1" -LE "$keeps_time") ]]; then
-    echo "kerf: test: these failed, and they keep time; they try again: $again" >&2
+# By name: with a label, ctest --rerun-failed takes its numbers for those of other tests.
+failed=$(sed 's/^[0-9]*://' "$failures" 2>/dev/null) || true
+if ((status)) && [[ -n $failed && " $* " != *' --output-junit '* && " $* " != *' --repeat '* ]]; then
+  keep_time=$(ctest --preset "$1" -N -L 'realtime|hil-fuse' | sed -n 's/^ *Test *#[0-9]*: //p')
+  if ! grep -qvxFf <(echo "$keep_time") <<<"$failed"; then
+    echo "kerf: test: these failed, and they keep time; they try again: $(paste -sd ' ' <<<"$failed")" >&2
     mv "$outputs" "$said.first"
-    if ctest --preset "$1" --rerun-failed --no-tests=error --repeat until-pass:2; then
-      echo "kerf: test: passed at a second or third try: $again" >&2
+    if ctest --preset "$1" -R "^($(paste -sd '|' <<<"$failed"))\$" --no-tests=error --repeat until-pass:2; then
+      echo "kerf: test: passed at a second or third try: $(paste -sd ' ' <<<"$failed")" >&2
       status=0
     fi
     cat "$outputs" >>"$said.first" && mv "$said.first" "$outputs"
