@@ -14,27 +14,27 @@ command -v debootstrap >/dev/null || apt-get install -y -qq debootstrap
 # The mounts of a root are seen by this process and its children alone, so they are gone when it ends, however it ends.
 if [[ ${KERF_OWN_MOUNTS:-} != yes ]]; then KERF_OWN_MOUNTS=yes exec unshare --mount --propagation private "$0" "$@"; fi
 
-fresh_root() {  # RELEASE USER FOLDER
-  rm -rf "$3"
-  mkdir -p "$3"
-  debootstrap --include=ca-certificates,git,sudo "$1" "$3"
-  mount -t proc proc "$3/proc"
-  mount --rbind /dev "$3/dev"
-  mount --rbind /sys "$3/sys"
-  cp -L /etc/resolv.conf "$3/etc/resolv.conf"
+fresh_root() {  # RELEASE USER FOLDER; one chain, because its caller asks for its exit code
+  rm -rf "$3" && mkdir -p "$3" && debootstrap --include=ca-certificates,git,sudo "$1" "$3" &&
+    mount -t proc proc "$3/proc" && mount --rbind /dev "$3/dev" && mount --rbind /sys "$3/sys" &&
+    cp -L /etc/resolv.conf "$3/etc/resolv.conf" && git clone -q --bare . "$3/srv/kerf.git" || return 1
   if [[ $2 != root ]]; then
-    chroot "$3" useradd -m -s /bin/bash "$2"
-    echo "$2 ALL=(ALL) NOPASSWD:ALL" >"$3/etc/sudoers.d/$2"
+    chroot "$3" useradd -m -s /bin/bash "$2" && echo "$2 ALL=(ALL) NOPASSWD:ALL" >"$3/etc/sudoers.d/$2"
   fi
-  git clone -q --bare . "$3/srv/kerf.git"
 }
 # typed FOLDER USER LINE: as this user in its home, without a variable of ours.
 typed() {
-  env -i TERM=dumb chroot "$1" su - "$2" -c "$3" </dev/null
+  chroot "$1" /usr/bin/env -i TERM=dumb /bin/su - "$2" -c "$3" </dev/null
 }
 
-mkdir -p build/roots
 (($#)) || set -- bookworm:root trixie:ada
+for pair in "$@"; do
+  if [[ ! $pair =~ ^[a-z]+:[a-z]+$ ]]; then
+    echo "check-roots: $pair: no RELEASE:USER; take for example trixie:root" >&2
+    exit 2
+  fi
+done
+mkdir -p build/roots
 for pair in "$@"; do
   release=${pair%:*} user=${pair#*:} folder=$PWD/build/roots/${pair/:/-}
   fresh_root "$release" "$user" "$folder" >"$folder.log" 2>&1 || {
