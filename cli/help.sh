@@ -130,7 +130,7 @@ judge() {
       -[0-9.]* | -) ;;
       -*)
         [[ -n ${takes[$option]+known} ]] ||
-          die "$title: $option: unknown; $(near "$option" "${!takes[@]}")see $me $title --help"
+          die "$title: $option: unknown; $(near "$option" "${!takes[@]}" --help)see $me $title --help"
         if [[ -z ${takes[$option]} || $option != "$word" ]]; then continue; fi
         needs_value "$title" "$option" "${1:-}"
         if [[ $option == --scene ]]; then judge_scene "$title: --scene" "$1"; fi
