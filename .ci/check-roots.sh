@@ -17,7 +17,7 @@ if [[ ${KERF_OWN_MOUNTS:-} != yes ]]; then KERF_OWN_MOUNTS=yes exec unshare --mo
 fresh_root() {  # RELEASE USER FOLDER; one chain, because its caller asks for its exit code
   rm -rf "$3" && mkdir -p "$3" && debootstrap --include=ca-certificates,git,sudo "$1" "$3" &&
     mount -t proc proc "$3/proc" && mount --rbind /dev "$3/dev" && mount --rbind /sys "$3/sys" &&
-    cp -L /etc/resolv.conf "$3/etc/resolv.conf" && git clone -q --bare . "$3/srv/kerf.git" || return 1
+    cp -L /etc/resolv.conf "$3/etc/resolv.conf" && git clone -q --bare --no-local . "$3/srv/kerf.git" || return 1
   if [[ $2 != root ]]; then
     chroot "$3" useradd -m -s /bin/bash "$2" && echo "$2 ALL=(ALL) NOPASSWD:ALL" >"$3/etc/sudoers.d/$2"
   fi

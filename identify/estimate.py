@@ -311,10 +311,16 @@ def _ljung_box(series, lags=10):
 
 
 def _fitted(motion, axes, quantum_m, joint_friction):
-    """Share of the force that is left, and the fit."""
+    """Share of the force that is left, and the fit.
+
+    The steps of an arm that sticks most of the time need not come closer: the best of the last rounds counts, but only if none of
+    them, nor the directions that follow from the best, leave SPOILT of the force. Otherwise the next step leads away from it, and
+    rounding errors decide how good it was: arm 28 of tests/identify/study.py, with forces that differ by 1e-12, ends with between 3 %
+    and all of the force. Arms that are identified leave at most 18 % in each round."""
     fit = _Fit(motion, axes, quantum_m, joint_friction)
     fit.scan_delay()
-    best = np.inf, fit.theta
+    left = lambda: _checks(fit, fit.rows(fit.theta[_D]))[0]
+    best, worst = (np.inf, fit.theta), 0.0
     for round_ in range(10):
         if round_ == 4:
             fit.mode = modes.find(motion, fit)
@@ -323,19 +329,22 @@ def _fitted(motion, axes, quantum_m, joint_friction):
         if round_ == 7:
             _leave_out_slips(fit)
             _leave_out_spoilt(fit)
-        share = _checks(fit, fit.rows(fit.theta[_D]))[0]
-        if round_ > 5 and share < best[0]:
-            best = share, fit.theta.copy()
-    # The steps of an arm that sticks most of the time need not come closer.
+        if round_ >= 7:
+            share = left()
+            worst = max(worst, share)
+            if share < best[0]:
+                best = share, fit.theta.copy()
     fit.theta = best[1]
     fit.follow()
-    return best[0], fit
+    worst = max(worst, left())
+    return best[0] if worst < SPOILT else worst, fit
 
 
 def estimate(motion, seed=1):
     """Raises NoEstimate."""
     try:
-        return _estimate(motion, seed)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of a fit that does not settle
+            return _estimate(motion, seed)
     except np.linalg.LinAlgError:
         raise NoEstimate(f"the motion of these {motion.good.sum() * motion.period_s:.1f} s does not determine mass, friction and delay of all axes "
                          "that moved; record more of it") from None
@@ -356,10 +365,11 @@ def _estimate(motion, seed):
         other, joint = _fitted(motion, axes, quantum_m, True)
         if other < BETTER * share:
             share, fit = other, joint
+    found = _with_intervals(fit, quantum_m, seed)  # first, because it tells a motion that is too short
     if not share < SPOILT:
         raise NoEstimate(f"mass, friction and delay explain less than {1 - SPOILT:.0%} of the force: friction may take most of it (a higher limit "
                          "helps), something else moves the device, or it is no arm of this model")
-    return _with_intervals(fit, quantum_m, seed)
+    return found
 
 
 def _leave_out_slips(fit):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
 try:
     import numpy as np
@@ -62,8 +63,8 @@ class TestRows(unittest.TestCase):
 class TestArms(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        # Of the study's: little friction, a mode with coarse encoders, 1.4 kg, and 10 g with 0.6 N of friction.
-        cls.arms = emulated.draw(29, 1)[[4, 5, 6, 28]]
+        # Of the study's: little friction, a mode with coarse encoders, 1.4 kg, and 16 to 32 g with 1 N of friction.
+        cls.arms = emulated.draw(29, 1)[[4, 5, 6, 7]]
         experiment = Experiment(np.full(len(cls.arms), emulated.LIMIT_N))
         cls.places, cls.forces = emulated.run(LIB, cls.arms, experiment, SECONDS)
 
@@ -87,6 +88,15 @@ class TestArms(unittest.TestCase):
     def test_an_arm_whose_friction_takes_the_force_is_refused(self):
         with self.assertRaisesRegex(estimate.NoEstimate, "friction may take most of it"):
             estimate.estimate(motion_of(self.places, self.forces, 3))
+
+    def test_a_fit_that_does_not_settle_is_refused(self):
+        motion = motion_of(self.places[:4000], self.forces[:4000], 0)
+        # What is left after each of the last rounds, and with the directions that follow from the best: one above SPOILT is enough.
+        good = [0.12, 0.10, 0.11, 0.11]
+        for spoilt in (None, 0, 1, 2, 3):
+            left = [0.4 if n == spoilt else share for n, share in enumerate(good)]
+            with mock.patch.object(estimate, "_checks", side_effect=[(share, None) for share in left]):
+                self.assertEqual(estimate._fitted(motion, [0, 1, 2], self.arms[0]["quantum"], False)[0], 0.10 if spoilt is None else 0.4)
 
     def test_a_gap_costs_a_part_of_the_log_alone(self):
         motion = motion_of(self.places, self.forces, 0)
