@@ -354,7 +354,7 @@ def _estimate(motion, seed):
     place = motion.place_m
     count = len(place)
     if motion.good.sum() * motion.period_s < 2.0:
-        raise NoEstimate(f"{motion.good.sum() * motion.period_s:.1f} s of sound ticks; at least 2 s of motion are needed")
+        raise NoEstimate(f"{motion.good.sum() * motion.period_s:.4g} s of sound ticks; at least 2 s of motion are needed")
     quantum_m = np.array([quantum_of(place[:, i]) for i in range(3)])
     travel = np.ptp(place[motion.good], axis=0)
     axes = [i for i in range(3) if travel[i] > 20 * max(quantum_m[i], 1e-6)]
@@ -369,6 +369,9 @@ def _estimate(motion, seed):
     if not share < SPOILT:
         raise NoEstimate(f"mass, friction and delay explain less than {1 - SPOILT:.0%} of the force: friction may take most of it (a higher limit "
                          "helps), something else moves the device, or it is no arm of this model")
+    if not np.all(np.linalg.eigvalsh(fit.theta[_AT][np.ix_(axes, axes)]) > 0):
+        raise NoEstimate("the mass comes out negative: the force of the log has the other sign, its axes are not those of the positions, or it "
+                         "is not all of the force")
     return found
 
 

@@ -98,6 +98,11 @@ class TestArms(unittest.TestCase):
             with mock.patch.object(estimate, "_checks", side_effect=[(share, None) for share in left]):
                 self.assertEqual(estimate._fitted(motion, [0, 1, 2], self.arms[0]["quantum"], False)[0], 0.10 if spoilt is None else 0.4)
 
+    def test_a_force_of_the_other_sign_is_refused(self):
+        motion = motion_of(self.places[:20000], -self.forces[:20000], 0)
+        with self.assertRaisesRegex(estimate.NoEstimate, "^the mass comes out negative: the force of the log has the other sign"):
+            estimate.estimate(motion)
+
     def test_a_gap_costs_a_part_of_the_log_alone(self):
         motion = motion_of(self.places, self.forces, 0)
         motion.good[20000:23000] = False
