@@ -336,7 +336,7 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   LoadedScene scene = paper_scene(48);
   scene.path = "scenes/x.toml";
   scene.cut.model = CutModel::overlap;
-  scene.tools.push_back(shape("cylinder", 2, 4));
+  scene.tools = {ball(4), shape("cylinder", 1.7, 3.4)};  // one fits, one does not, by each set
   scene.tools.back().name = "stub";
   scene.servo.rate_hz = 8000;
   const std::string line = budget_error(scene, plan_scene(scene)->costs());
